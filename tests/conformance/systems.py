@@ -18,7 +18,7 @@ EPS = 2.0**-52
 
 @sl.system(states="x v", forced_at="frequency")
 def lab(
-    t, x, v, *, lift=0.0, spring=0.0, damping=0.0, cubic=0.0, force=0.0, boundary=1.0,
+    t, x, v, *, lift=0.0, spring=0.0, damping=0.0, force=0.0, boundary=1.0,
     stiffness=0.0, dashpot=0.0, preload=0.0,
     frequency=0.01,
 ):  # fmt: skip
@@ -28,7 +28,20 @@ def lab(
     contact = sl.piecewise(
         (stiffness * (x - boundary) + dashpot * v + preload, x > boundary), otherwise=0
     )
-    return v, lift + force * sl.cos(
+    return v, lift + force * sl.cos(2 * sl.pi * frequency * t) - spring * x - damping * v - contact
+
+
+@sl.system(states="x v", forced_at="frequency")
+def bent(
+    t, x, v, *, spring=0.0, damping=0.0, cubic=1.0, force=0.0, boundary=1.0, stiffness=0.0,
+    dashpot=0.0, preload=0.0,
+    frequency=0.01,
+):  # fmt: skip
+    """The same with a spring that isn't linear: where it is negative, the mass may blow up."""
+    contact = sl.piecewise(
+        (stiffness * (x - boundary) + dashpot * v + preload, x > boundary), otherwise=0
+    )
+    return v, force * sl.cos(
         2 * sl.pi * frequency * t
     ) - spring * x - damping * v - cubic * x**3 - contact
 
@@ -50,11 +63,11 @@ def ball_of_clay(t, x, v, *, slope=1.0):
 
 
 @sl.system(states="x v a j")
-def quartic(t, x, v, a, j, *, snap=24.0, push=0.0, lacunary=0.0):
+def quartic(t, x, v, a, j, *, snap=24.0, push=0.0):
     """x is a polynomial of degree 4 in time: gaps of any shape, exact in a single step of any
     length.
     """
-    return v, a, j, snap + sl.piecewise((push, x > 0), otherwise=0) - lacunary * t**4 * x
+    return v, a, j, snap + sl.piecewise((push, x > 0), otherwise=0)
 
 
 def quartic_with_roots(*roots: float) -> tuple[float, float, float, float]:

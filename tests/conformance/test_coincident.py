@@ -12,7 +12,10 @@ import saltus as sl
 from conformance.systems import contacts, latch, pair, walls
 
 # these tests look at the status themselves
-pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning"),
+    pytest.mark.usefixtures("exact_method"),
+]
 
 
 def test_two_bodies_meet_their_stops_at_one_instant():

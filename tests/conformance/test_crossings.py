@@ -14,7 +14,10 @@ import saltus as sl
 from conformance.systems import EPS, contacts, lab, pair, quartic, quartic_with_roots
 
 # these tests look at the status themselves
-pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning"),
+    pytest.mark.usefixtures("exact_method"),
+]
 
 PARABOLA = lab.with_values(lift=-2.0)  # x = 2 t - t^2 from (0, 2): its top is 1, at t = 1
 DEPTHS = 10.0 ** -np.arange(5, 13)

@@ -13,7 +13,10 @@ import saltus as sl
 from conformance.systems import EPS, contacts, lab, slider
 
 # these tests look at the status themselves
-pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning"),
+    pytest.mark.usefixtures("exact_method"),
+]
 
 
 @pytest.mark.parametrize("preload", [4.0, 1e3, 0.01, 3.0000000001])

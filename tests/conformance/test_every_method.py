@@ -16,7 +16,7 @@ import pytest
 from scipy.optimize import brentq
 
 import saltus as sl
-from conformance.systems import ball_of_clay, bits, lab, pinched
+from conformance.systems import ball_of_clay, bent, bits, lab, pinched
 from saltus.analysis.basins import pipeline
 from saltus.errors import SaltusWarning
 from saltus.flow import engine
@@ -271,7 +271,7 @@ def test_a_trajectory_is_the_same_alone_and_in_any_threads_and_pieces(method, mo
 @every
 def test_a_blow_up_stays_in_its_lane(method):
     """x'' = x^3 from 1e5 is at infinity long before the end."""
-    runaway = lab.with_values(cubic=-1.0, boundary=0.5)
+    runaway = bent.with_values(cubic=-1.0, boundary=0.5)
     healthy = {"x": np.array([0.1, -0.2, 0.45]), "v": np.array([0.01, 0.3, -0.4])}
     mixed = {"x": np.insert(healthy["x"], 1, 1e5), "v": np.insert(healthy["v"], 1, 1e9)}
     few = dataclasses.replace(method, max_steps=20_000)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -13,7 +14,10 @@ import saltus as sl
 from conformance.systems import EPS, contacts, lab, pair, quartic, quartic_with_roots, ring
 
 # these tests look at the status themselves
-pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning"),
+    pytest.mark.usefixtures("exact_method"),
+]
 
 PARABOLA = lab.with_values(lift=-2.0)  # x = 2 t - t^2 from (0, 2): its top is 1, at t = 1
 EIGHTHS = [i / 8 for i in range(1, 8)]
@@ -109,6 +113,26 @@ def test_grazes_of_two_bodies_in_one_step():
     ]
 
 
+def test_grazes_are_in_the_order_of_time():
+    """The second body touches first."""
+    run = sl.simulate(
+        pair.with_values(lift=-2.0, stop1=4.0, gap=99.0), (0.0, 4.0, 0.0, 2.0), t_end=5.0, samples=2
+    )
+    assert [(c.guard, c.kind, c.time) for c in contacts(run)] == [
+        ("stop2", "graze", 1.0),
+        ("stop1", "graze", 2.0),
+    ]
+
+
+@pytest.mark.parametrize("periods", [1, 2, 3])
+def test_tangency_where_a_period_ends(periods):
+    """One graze at t = 1, where steps end: in a run that goes on, and in one that doesn't."""
+    run = sl.simulate(PARABOLA.with_values(frequency=1.0), (0.0, 2.0), periods=periods, samples=4)
+    assert [(c.time, c.kind) for c in contacts(run)] == [(1.0, "graze")]
+    assert str(run.status.values) == "ok"
+    assert int(run.mode[-1]) == 0
+
+
 def test_two_grazes_of_one_body_in_one_step():
     """x = (t - 1)^2 (t - 2)^2: two touches within one step, each recorded (exact, or unresolved
     where rounding hides it).
@@ -140,10 +164,12 @@ def test_tangent_of_a_circle(offset):
 
 # -- within rounding -------------------------------------------------------------------------------
 @pytest.mark.parametrize("t_end", [1.0, 1.1, 2.0])
-def test_touch_within_rounding_is_flagged(t_end):
+def test_touch_within_rounding_is_flagged(t_end, exact_method, request):
     """x = (t - a)^2 (t - b) (t - c), a, b, c at eighths: whether the gap closes at a is below
     rounding; record and status say so.
     """
+    if exact_method == "Modal":  # one in a hundred: docs/trust.md
+        request.applymarker(pytest.mark.xfail(reason="rounding of earlier steps isn't counted"))
     triples = [
         (a, b, c)
         for a in EIGHTHS
@@ -180,6 +206,25 @@ def test_parabola_an_ulp_from_the_boundary_is_flagged(ulps):
     assert str(run.status.values) == "graze_unresolved"
     assert int(run.grazes_unresolved) >= 1
     assert all(abs(c.time - speed / 2) < 1e-7 for c in contacts(run))
+
+
+def test_touch_within_rounding_of_the_end_is_flagged():
+    """The top of x0 + v t - t^2, t = v / 2, is the end of the run; the boundary is a double beside
+    it. No run says nothing, and none takes rounding for two crossings.
+    """
+    x0, v = 0.1 * np.random.default_rng(3).uniform(-1, 1, 60), 1.375
+    top = x0 + v**2 / 4  # rounded, in some cases
+    run = sl.simulate(
+        PARABOLA.with_values(stiffness=50.0), {"x": x0, "v": v}, t_end=v / 2, samples=2,
+        values={"boundary": top},
+    )  # fmt: skip
+    exact = [
+        Fraction(a) + Fraction(v) ** 2 / 4 == Fraction(b) for a, b in zip(x0, top, strict=True)
+    ]
+    kinds = [["graze"] if one else ["graze_unresolved"] for one in exact]
+    assert 0 < sum(exact) < 60
+    assert [[c.kind for c in contacts(run, i)] for i in range(60)] == kinds
+    assert run.status.values.tolist() == ["ok" if one else "graze_unresolved" for one in exact]
 
 
 @pytest.mark.parametrize("root", [0.3, 0.7, 1.1, 1.7])

@@ -13,6 +13,8 @@ import pytest
 import saltus as sl
 from conformance.systems import contacts, lab, slider
 
+pytestmark = pytest.mark.usefixtures("exact_method")
+
 REFERENCE = Path(__file__).parents[1] / "reference"
 
 

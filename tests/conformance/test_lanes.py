@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from conformance.systems import bits, differing, lab
+from conformance.systems import bent, bits, differing
 
 # these tests look at the status themselves
 pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
 
 # A driven oscillator with a boundary that has stiffness, dashpot and preload: contacts, grazes,
 # sliding and rest all occur in a batch.
-SYSTEM = lab.with_values(
+SYSTEM = bent.with_values(
     spring=1.0,
     damping=0.02,
     cubic=0.3,

@@ -12,6 +12,8 @@ import pytest
 import saltus as sl
 from conformance.systems import contacts, pair, walls
 
+pytestmark = pytest.mark.usefixtures("exact_method")
+
 
 def _check_sides(run, gaps, slack):
     """Mode bits against the signs of the gaps, where these are larger than the slack; everything on

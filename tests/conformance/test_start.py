@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from conformance.systems import contacts, lab, pair, quartic, ring, slider, walls
+from conformance.systems import EPS, contacts, lab, pair, quartic, ring, slider, walls
 
 # these tests look at the status themselves
-pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning"),
+    pytest.mark.usefixtures("exact_method"),
+]
 
 FREE, CONTACT = 0, 1
 
@@ -30,7 +33,7 @@ FREE, CONTACT = 0, 1
         pytest.param((0, 1e-150, 1, 0), CONTACT, "ok", id="velocity_counts_however_small"),
     ],
 )
-def test_start_on_the_boundary(start, mode, status):
+def test_start_on_the_boundary(start, mode, status, exact_method):
     """No event at t0; the side is the sign of the first derivative of the gap that isn't zero; a
     few steps, no endless loop.
     """
@@ -40,15 +43,19 @@ def test_start_on_the_boundary(start, mode, status):
     assert int(run.steps) < 10
     if status == "ok":
         assert run.mode.values[1:].tolist() == [mode] * 4
-    assert float(run.end_x) == start[0] + start[1] + start[2] / 2 + start[3] / 6
+    rounding = EPS * int(run.steps) if exact_method == "Modal" else 0.0  # one step, and several
+    end = start[0] + start[1] + start[2] / 2 + start[3] / 6
+    assert float(run.end_x) == pytest.approx(end, rel=0.0, abs=rounding)
     assert int(run.mode_violations) == 0
 
 
 @pytest.mark.parametrize("speed", [1e-3, 1e-9, 1e-100, 1e-150])
-def test_start_into_contact_against_the_force_comes_back(speed):
+def test_start_into_contact_against_the_force_comes_back(speed, exact_method, request):
     """x = speed t - t^2 / 2 from the boundary: in contact at t0 by its velocity, however small, and
     out at 2 speed.
     """
+    if exact_method == "Modal" and speed < EPS:  # docs/decisions/0096
+        request.applymarker(pytest.mark.xfail(reason="a flight lower than rounding is left out"))
     run = sl.simulate(quartic.with_values(snap=0.0), (0.0, speed, -1.0, 0.0), t_end=1.0, samples=4)
     (only,) = contacts(run)
     assert (only.before, only.after, only.kind) == (CONTACT, FREE, "crossing")

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from conformance.systems import bits, contacts, lab
+from conformance.systems import bent, bits, contacts, lab
 
 # these tests look at the status themselves
 pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
 
 # x'' = x^3: x = sqrt(2) / (1 - t) from (sqrt 2, sqrt 2)
-BLOW_UP = lab.with_values(cubic=-1.0, boundary=0.5)
+BLOW_UP = bent.with_values(cubic=-1.0, boundary=0.5)
 HEALTHY = {"x": [0.1, -0.2, 0.0, 0.3, 0.45, -0.4], "v": [0.01, 0.3, 0.0, -0.1, -0.4, 0.2]}
 
 

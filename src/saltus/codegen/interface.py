@@ -256,6 +256,7 @@ MODAL = Interface(
         "modal/impacts",
         "modal/friction",
         "modal/tangents",
+        "modal/touches",
         "modal/ends",
         "modal/steps",
     ),

@@ -154,9 +154,18 @@ class ModalFlow:
         free = (tables.plain | (tables.allowed != 0)) & ~(stays | held)
         side, met = np.where((mode >> guards) & 1, 1.0, -1.0), (fresh >> guards) & (gap == 0.0) != 0
         least = np.where(tables.rubs, 2 * noise, noise / 4)  # what slides isn't taken to stick
-        near = ((free & ~met) | (tables.rubs & ~held)) & (np.abs(gap) <= 2 * noise)
-        near &= (side * gap < least) & (tables.rubs | (np.abs(gap) <= noise))
+        asked = (free & ~met) | (tables.rubs & ~held)
+        near = asked & (np.abs(gap) <= 2 * noise) & (side * gap < least)
+        near &= tables.rubs | (np.abs(gap) <= noise)
+        wrong = asked & ~near & (tables.plain | tables.rubs) & (side * gap < 0.0)
+        for i in np.flatnonzero(wrong.any(axis=1)).tolist():  # the clock's rounding may do that
+            rates = self._rates(given, int(mode[i, 0]), state[i], time[i])
+            near[i] |= wrong[i] & (np.abs(gap[i]) <= 2 * layout.CLOCK * np.abs(time[i] * rates))
         for i, g in np.argwhere(near).tolist():
+            if gap[i, g] == 0.0 and tables.plain[g]:  # on it, and back to its side: a touch
+                up, *_ = self._ways(given, int(mode[i, 0]), guards == g, state[i], time[i])
+                if (up >> g) & 1 == (side[i, g] > 0.0):
+                    continue
             row = given.gaps.matrix[g]
             j = int(np.argmax(np.abs(row)))
             batch.state[who[i], j] += (side[i, g] * least[i, g] - gap[i, g]) / row[j]
@@ -295,7 +304,7 @@ class ModalFlow:
         apart = ((gap * allowed > 0) & state.any(axis=1)[:, None]) @ bits if len(bits) else fresh
         fresh &= ~(apart & ~twice)
         for i in np.flatnonzero(zero.any(axis=1)).tolist():
-            up, slow, slower, moves = self._ways(which, int(mode[i]), zero[i], state[i], time[i])
+            up, slow, slower, moves = self._ways(given, int(mode[i]), zero[i], state[i], time[i])
             # with a rate a gap in rounding isn't zero either, if it is that of a motion
             moves &= int((gap[i] != 0.0) @ bits) if state[i].any() else 0
             up = (up & ~moves) | (moves & int((gap[i] > 0.0) @ bits))
@@ -350,15 +359,14 @@ class ModalFlow:
         return found
 
     def _ways(
-        self, which: int, mode: int, zero: np.ndarray, state: np.ndarray, time: float
+        self, given: ValueSet, mode: int, zero: np.ndarray, state: np.ndarray, time: float
     ) -> tuple[int, int, int, int]:
         """Bits of the guards at zero whose gaps open upwards, by the first derivative that isn't
         rounding; of those whose rate is zero, of those whose second derivative is too, and of those
         whose rate isn't.
         """
-        given = self.tables.sets[which]
         piece = self.tables.equations.piece_of(given, mode)
-        values, sizes = self._drives_at(which, time)
+        values, sizes = self._drives_at(given, time)
         rate, size, steady = state, np.abs(state), piece.constant
         open_, bits = set(np.flatnonzero(zero).tolist()), [0] * 4
         for order in range(1, WAYS + 1):
@@ -380,11 +388,18 @@ class ModalFlow:
                         bits[k] |= int(holds) << g
         return bits[0], bits[1], bits[2], bits[3]
 
-    def _drives_at(self, which: int, time: float) -> tuple[np.ndarray, np.ndarray]:
+    def _rates(self, given: ValueSet, mode: int, state: np.ndarray, time: float) -> np.ndarray:
+        """Rates of all gaps at a time, float64[guards]."""
+        piece = self.tables.equations.piece_of(given, mode)
+        values, _ = self._drives_at(given, time)
+        rate = piece.matrix @ state + piece.driven @ values[0] + piece.constant
+        return np.array(given.gaps.matrix @ rate + given.gaps.driven @ values[1])
+
+    @staticmethod
+    def _drives_at(given: ValueSet, time: float) -> tuple[np.ndarray, np.ndarray]:
         """The drives and their derivatives at a time, and what their sizes are at most:
         float64[1 + WAYS, drives].
         """
-        given = self.tables.sets[which]
         orders = np.arange(WAYS + 1)[:, None]
         waves = np.exp(1j * (given.rates * time + given.lags)) * (1j * given.rates) ** orders
         courses = np.zeros((WAYS + 1, len(given.courses)))

@@ -188,7 +188,9 @@ def _answer(
 
 
 def _limit(matrix: np.ndarray) -> float:
-    """alpha with ||T^k|| <= alpha^k for all k > 11 [1/s]."""
+    """alpha with ||T^k|| <= alpha^k for all k > 11 [1/s]: 0 for motions that are polynomials."""
+    if not np.linalg.matrix_power(matrix, 12).any():
+        return 0.0
     fourth = np.linalg.matrix_power(matrix, 4)
     norms = [np.abs(one).sum(axis=1).max() for one in (fourth, fourth @ matrix)]
     return float(max(norms[0] ** 0.25, norms[1] ** 0.2))

@@ -12,6 +12,7 @@ laws              impacts, contacts at rest, their release
 impacts           several impacts at one instant
 friction          friction that sticks and slides
 tangents          the derivative of the state with respect to the start and to parameters
+touches           tangencies
 ends              what a run leaves to the next one
 steps             steps, and the life of a trajectory
 ================  ==================================================================================

@@ -366,6 +366,13 @@ def terms_of(i, g, side, batch, m):
 
 
 @inner
+def without_zeros(known, m):
+    """Divide the known zeros at the beginning of the step out of the terms in `p`."""
+    for k in range(ORDER + 1 if known > 0 else 0):
+        m.p[k] = m.p[k + known] if k + known <= ORDER else 0.0
+
+
+@inner
 def begins_pressed(i, g, batch, m):
     """True if a contact is a stop that is pressed at the start of a run."""
     return batch.carry[i, STARTS] > 0.5 and g >= 0 and m.found[g, PRESSED] > 0.5
@@ -405,8 +412,7 @@ def decide(i, g, batch, m):
     fresh, degree, whole = known > 0, ORDER - known, error
     if fresh:
         whole += abs(m.p[0])  # what the bounded modes add to the gap where it is zero
-        for k in range(ORDER + 1):
-            m.p[k] = m.p[k + known] if k <= degree else 0.0
+        without_zeros(known, m)
         error = slope_error if exact else slope_error + ORDER * noise
         if known > 1 and not exact:
             return OPEN
@@ -438,6 +444,9 @@ def decide(i, g, batch, m):
         elif ends:
             m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
             return CROSSES
+        elif m.p[1] < 0.0 and m.laws[g, KIND] != HOLD_LAW:  # it turns, which the step before noted
+            m.p[0] = 0.0
+            side_of_leaving(m.p, degree, 0, noise)
     if exact:
         to_bernstein(m.p, degree, m.bern[0])
     else:
@@ -447,13 +456,45 @@ def decide(i, g, batch, m):
     answer = pieces(g, degree, fresh, error, whole, slope_error, noise, shortest, m)
     if answer != OPEN or not exact:
         return answer
-    crosses, touched = first_crossing(
-        m.p, degree, fresh, noise, g, m.bern, m.bounds, m.slopes, m.out, m.touches,
+    crosses, touched = isolate(g, degree, known, noise, m)
+    m.found[g, PLACE], m.found[g, FINAL] = m.out[ROOT_AT], 1.0
+    if m.laws[g, KIND] != HOLD_LAW:
+        crosses, touched = settle(g, degree, known, noise, crosses, touched, m)
+    m.found[0, TOUCHED] = min(touched, MOST_TOUCHES - 1)
+    return CROSSES if crosses else CLEAR
+
+
+@inner
+def isolate(g, degree, known, noise, m):
+    """Isolate the first crossing of a gap, whose terms are in `p`: whether it crosses, and the
+    touches now held.
+    """
+    return first_crossing(
+        m.p, degree, known > 0, noise, g, m.bern, m.bounds, m.slopes, m.out, m.touches,
         min(int(m.found[0, TOUCHED]), MOST_TOUCHES - 1),
     )  # fmt: skip
-    m.found[0, TOUCHED] = min(touched, MOST_TOUCHES - 1)
-    m.found[g, PLACE], m.found[g, FINAL] = m.out[ROOT_AT], 1.0
-    return CROSSES if crosses else CLEAR
+
+
+@kernel
+def turn_before(i, d, margin, modes, steady, batch, m):
+    """Lower the smallest margin by the turns of gaps before a landing, a time d into the step: one
+    beyond it doesn't happen.
+    """
+    which, used = int(batch.carry[i, SET]), groups_of(modes, m)
+    m.out[MARGIN], m.found[0, FACTORS] = margin, 0.0
+    follow_block(modes, d, m)
+    end_drives(which, d, m)
+    end_factors(modes, d, used, m)
+    for g in range(m.sizes[GUARDS] if d > 0.0 else 0):
+        if m.found[g, TURNED] < margin:
+            series_of(m.row_of[g], modes, steady, which, d, used, m)
+            noise = terms_of(i, g, side_of(g, batch.mode[i]), batch, m)
+            known = known_zeros(i, g, batch)
+            without_zeros(known, m)
+            side_of_leaving(m.p, ORDER - known, known, noise)
+            crosses, touched = isolate(g, ORDER - known, known, noise, m)
+            m.found[g, PLACE] = m.out[ROOT_AT]
+            settle(g, ORDER - known, known, noise, crosses, touched, m)
 
 
 @inner
@@ -476,17 +517,18 @@ def look(i, tau, h, modes, steady, batch, m):
     """
     which, near = int(batch.carry[i, SET]), followed(modes, h, m)
     margin = batch.minima[i, GAP_MARGIN]
+    lowest = margin
     follow_block(modes, h, m)
     end_drives(which, h, m)
     for r in range(m.sizes[GAP_ROWS]):
         bound_row(r, modes, steady, which, h, near, m)
-    m.out[MARGIN], m.found[0, TOUCHED], m.found[0, FACTORS] = margin, 0.0, 0.0
+    m.found[0, TOUCHED], m.found[0, FACTORS] = 0.0, 0.0
     crossing, hits, first, until = 0, 0, h, 1.0
     for g in range(m.sizes[GUARDS]):
-        m.found[g, RIDDEN], m.found[g, DECIDED] = 0.0, 1.0
+        m.found[g, RIDDEN], m.found[g, DECIDED], m.found[g, TURNED] = 0.0, 1.0, margin
         if not is_watched(g, batch.mode[i], m):
             continue
-        r = m.row_of[g]
+        r, m.out[MARGIN] = m.row_of[g], margin
         if m.spans[r, KNOWN] == 0.0:
             if is_far(i, g, batch, m):
                 continue
@@ -502,8 +544,8 @@ def look(i, tau, h, modes, steady, batch, m):
         if answer == CROSSES:
             crossing |= 1 << g
         until = min(until, m.found[g, DECIDED])
-    if until < 1.0 and m.out[MARGIN] != margin:
-        return OPEN, 0.0, 0
+        m.found[g, TURNED], lowest = m.out[MARGIN], min(lowest, m.out[MARGIN])
+    m.out[MARGIN] = lowest
     for g in range(m.sizes[GUARDS]):
         if (crossing >> g) & 1:
             d = m.found[g, PLACE] * h
@@ -515,8 +557,10 @@ def look(i, tau, h, modes, steady, batch, m):
             elif hits == 0 or d < first:
                 hits, first = 1 << g, d
     if first > until * h:
-        return CLEAR, until * h, 0
+        first, hits = until * h, 0
     early = begun(i, hits, batch, m)
     if early != 0:
         first, hits = 0.0, early
+    if first < h and lowest < margin:
+        turn_before(i, first, margin, modes, steady, batch, m)
     return (CROSSES if hits != 0 else CLEAR), first, hits

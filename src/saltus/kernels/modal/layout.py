@@ -81,9 +81,9 @@ CLEAR, CROSSES, OPEN = range(3)
 # Columns of `found`, for each guard: the place of its crossing as a part of the step, whether that
 # is final, whether it is ridden, touches of the step (first row), the part of the step that is
 # decided, the end of the bracket of the crossing, whether a stop is pressed at the start, the
-# beginning of that bracket, groups of modes whose factors at the end of the step are known (first
-# row).
-PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET, PRESSED, BEGINS, FACTORS = range(9)
+# beginning of that bracket, the least margin by its turns, groups of modes whose factors at the
+# end of the step are known (first row).
+PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET, PRESSED, BEGINS, TURNED, FACTORS = range(10)
 # Columns of `stood`, for each row of gaps where the amplitudes stand: value and rate, the size of
 # its terms, what its fifth derivative is at most.
 HERE, SLOPE, SIZE, FIFTH = range(4)

@@ -10,7 +10,7 @@ to end below zero. The place is then found by Newton's method on the modes thems
 import math
 
 from saltus.kernels.batch import Batch
-from saltus.kernels.isolation import MARGIN, MOST_TOUCHES, TOUCH_AT, TOUCH_GUARD
+from saltus.kernels.isolation import MARGIN, MOST_TOUCHES
 from saltus.kernels.lanes import load, magnitude, splat, store
 from saltus.kernels.status import (
     BUDGET_EVENTS,
@@ -20,7 +20,6 @@ from saltus.kernels.status import (
     EVENTS,
     FINISHED,
     GAP_MARGIN,
-    GRAZE_SHALLOW,
     GRAZE_UNRESOLVED,
     NONFINITE,
     OK,
@@ -76,22 +75,6 @@ def record(i, g, tau, kind, direction, velocity, after, error, batch, m):
     for j in range(m.sizes[STATES], m.sizes[STATES] + m.sizes[REMEMBERED]):
         batch.rec_f[r, RECORD_FLOATS + j] = batch.state[i, j]
     batch.rec_f[r, RECORD_FLOATS + batch.state.shape[1]] = time_of(i, tau, batch)
-
-
-@kernel
-def note_touches(i, tau, h, until, modes, steady, batch, m):
-    """Count and record the tangencies of a step up to a time of it."""
-    for j in range(int(m.found[0, TOUCHED])):
-        d, g = m.touches[j, TOUCH_AT] * h, int(m.touches[j, TOUCH_GUARD])
-        if d > until:
-            continue
-        batch.counters[i, UNRESOLVED] += 1
-        state_after(i, tau, d, modes, steady, batch, m)
-        _, rate = gap_of_moved(m.row_of[g], modes, steady, int(batch.carry[i, SET]), m)
-        side = side_of(g, batch.mode[i])
-        record(
-            i, g, tau + d, GRAZE_SHALLOW, int(side), m.sign_of[g] * rate, batch.mode[i], h, batch, m
-        )
 
 
 @inner
@@ -302,7 +285,6 @@ def keep_on(i, h, batch, m):
     know_rides(i, batch, m)
     batch.carry[i, RIDES] = float(int(batch.carry[i, RIDES]) & batch.fresh[i])
     batch.carry[i, NEXT_STEP] = 4.0 * h
-    batch.minima[i, GAP_MARGIN] = m.out[MARGIN]
 
 
 @inner
@@ -393,6 +375,7 @@ def advance(i, budget, batch, m):
         else:
             stands = False
             batch.counters[i, STEPS] += 1
+            batch.minima[i, GAP_MARGIN] = m.out[MARGIN]
             take_samples(i, tau, tau + d, modes, steady, batch, m)
             note_touches(i, tau, h, d, modes, steady, batch, m)
             if answer == CLEAR:
@@ -413,7 +396,7 @@ def advance(i, budget, batch, m):
                 status = NONFINITE if is_lost(modes, m) else RUNNING
             else:
                 status = land_and_enter(i, tau, d, hits, modes, steady, batch, m)
-                tau += d
+                tau = end if d == end - tau else tau + d
         if status == RUNNING and batch.counters[i, EVENTS] >= batch.options[i, MOST_CONTACTS]:
             status = BUDGET_EVENTS
         if status == RUNNING and batch.counters[i, STEPS] >= batch.options[i, MOST_STEPS]:

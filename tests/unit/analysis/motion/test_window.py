@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from conformance.systems import lab
+from conformance.systems import bent, lab
 from saltus.flow import engine
 
 simulate_module = importlib.import_module("saltus.analysis.motion.simulate")
@@ -103,12 +103,12 @@ def test_the_outcome_of_a_run_inside_is_no_answer():
 def test_a_trajectory_that_fails_says_so():
     with pytest.warns(sl.errors.SaltusWarning, match="1 of 2 trajectories: nonfinite"):
         both = sl.impact_statistics(
-            lab, {"x": [0.0, 1.0], "v": 0.0}, periods=3, values=STOP | {"cubic": [0.0, -1e3]}
+            bent, {"x": [0.0, 1.0], "v": 0.0}, periods=3, values=STOP | {"cubic": [0.0, -1e3]}
         )
     assert both.status.values.tolist() == ["ok", "nonfinite"]
     with pytest.warns(sl.errors.SaltusWarning, match="nonfinite"):
         balance = sl.energy_balance(
-            lab,
+            bent,
             {"x": [0.0, 1.0], "v": 0.0},
             periods=3,
             values=STOP | {"cubic": [0.0, -1e3]},
