@@ -33,15 +33,15 @@ def lab(
 
 @sl.system(states="x v", forced_at="frequency")
 def bent(
-    t, x, v, *, spring=0.0, damping=0.0, cubic=1.0, force=0.0, boundary=1.0, stiffness=0.0,
-    dashpot=0.0, preload=0.0,
+    t, x, v, *, lift=0.0, spring=0.0, damping=0.0, cubic=1.0, force=0.0, boundary=1.0,
+    stiffness=0.0, dashpot=0.0, preload=0.0,
     frequency=0.01,
 ):  # fmt: skip
     """The same with a spring that isn't linear: where it is negative, the mass may blow up."""
     contact = sl.piecewise(
         (stiffness * (x - boundary) + dashpot * v + preload, x > boundary), otherwise=0
     )
-    return v, force * sl.cos(
+    return v, lift + force * sl.cos(
         2 * sl.pi * frequency * t
     ) - spring * x - damping * v - cubic * x**3 - contact
 

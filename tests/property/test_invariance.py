@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import saltus as sl
-from conformance.systems import bits, contacts, lab
+from conformance.systems import bent, bits, contacts
 
 RIG = sl.models.delangre("b")
 PERIODS = 6
@@ -124,8 +124,8 @@ def test_unit_of_time(values, start, power):
     k = 2.0**power
     once, twice = ("damping", "frequency"), ("spring", "cubic", "force", "lift", "stiffness")
     scaled = {**values, **{n: values[n] / k for n in once}, **{n: values[n] / k**2 for n in twice}}
-    plain = sl.simulate(lab, start, periods=PERIODS, samples=5, values=values)
-    other = sl.simulate(lab, (start[0], start[1] / k), periods=PERIODS, samples=5, values=scaled)
+    plain = sl.simulate(bent, start, periods=PERIODS, samples=5, values=values)
+    other = sl.simulate(bent, (start[0], start[1] / k), periods=PERIODS, samples=5, values=scaled)
     assert str(other.status.values) == str(plain.status.values)
     if not _near_a_graze(plain):
         _same(plain, other, time=k)

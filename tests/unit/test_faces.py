@@ -19,7 +19,7 @@ LARGER = {
     "analysis.closed": (40, "closed motions, isolated or not, their measures and units, cycles"),
     "analysis.inputs": (40, "types of arguments, the readers of each, the orbits of a result"),
     "analysis.attractors": (30, "what starts settle to, the search for it, answers over a grid"),
-    "language": (30, "expressions and what is made of them"),
+    "language": (35, "expressions and what is made of them, sums of states as rows"),
 }
 #: Rooms whose inner files some others may know: pyproject.toml, contracts of type "protected".
 KNOWN_TO = {

@@ -87,9 +87,20 @@ def note_touches(i, tau, h, until, modes, steady, batch, m):
             if m.touches[j, TOUCH_AT] < m.touches[soonest, TOUCH_AT]:
                 soonest = j
         d, g = m.touches[soonest, TOUCH_AT] * h, int(m.touches[soonest, TOUCH_GUARD])
-        if d <= until or ends_within(i, g, tau, until, modes, steady, batch, m):
+        met = d <= until
+        if not met and not stands_within(i, g, batch, m):
+            met = ends_within(i, g, tau, until, modes, steady, batch, m)
+        if met:
             note_touch(i, g, tau, min(d, until), h, modes, steady, batch, m)
         m.touches[soonest, TOUCH_AT] = 2.0
+
+
+@inner
+def stands_within(i, g, batch, m):
+    """True if a gap is within its rounding where the step begins."""
+    value, _ = here(i, g, batch, m)
+    away = m.offset[int(batch.carry[i, SET]), g]
+    return value <= ROUNDED * (m.stood[m.row_of[g], SIZE] + abs(away))
 
 
 @kernel
