@@ -7,7 +7,7 @@ import sys
 import pytest
 
 QUESTION = '''
-"""[stroboscope]: motions at whole forcing periods."""
+"""[points]: motions at whole forcing periods."""
 
 from saltus.results import table as rows
 from saltus.study.answers.question import OneVerb, asked
@@ -15,7 +15,7 @@ from saltus.study.tables.kinds import KINDS
 from saltus.study.tables.signature import table
 
 
-@asked(15, table("stroboscope", ["stroboscope"], KINDS, called="Stroboscope"))
+@asked(11, table("points", ["stroboscope"], KINDS, called="Points"))
 class Points(OneVerb):
     """Motions at whole periods."""
 
@@ -41,11 +41,11 @@ name = "a"
 [system]
 model = "delangre"
 """
-(answer,) = ask(HEAD + "[stroboscope]\nperiods = 5\n")
-print(list(QUESTIONS)[:3], "stroboscope" in Study.model_json_schema()["properties"])
+(answer,) = ask(HEAD + "[points]\nperiods = 5\n")
+print(list(QUESTIONS)[:3], "points" in Study.model_json_schema()["properties"])
 print(answer.question.stem, answer.rows[0].data[1], FILE.verb("stroboscope"))
 try:
-    ask(HEAD + "[stroboscope]\nperiod = 5\n")
+    ask(HEAD + "[points]\nperiod = 5\n")
 except StudyError as error:
     print(error)
 '''
@@ -61,7 +61,7 @@ def test_a_new_question_is_one_file(tmp_path):
     )  # fmt: skip
     assert said.returncode == 0, said.stderr
     assert said.stdout.splitlines() == [
-        "['simulate', 'stroboscope', 'poincare'] True",
-        "stroboscope ('6',) [stroboscope]",
-        "study: [stroboscope] has no key 'period'. Did you mean 'periods'?",
+        "['simulate', 'points', 'stroboscope'] True",
+        "points ('6',) [points]",
+        "study: [points] has no key 'period'. Did you mean 'periods'?",
     ]
