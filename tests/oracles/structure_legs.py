@@ -149,7 +149,10 @@ def _look(found, leg, z, begin, to, end, met, fresh, crossed, sizes):
             first = 1 if g in fresh and at == begin else 0
             last = -1 if g in met and stop == to else None
             least = values[g, first:last].min(initial=np.inf)
-            least = min(least, _dip(leg, g, path, values[g, :last], slopes[g, :last], terms[g]))
+            step = (stop - at) / (path.shape[1] - 1)
+            least = min(
+                least, _dip(leg, g, path, step, values[g, :last], slopes[g, :last], terms[g])
+            )
             if least < -noise[g]:
                 found.missed.append(f"gap {g} from {at!r} s on: {least / terms[g]:.2g}")
         z, at = path[:n, -1] / leg.units[:n], stop
@@ -160,15 +163,17 @@ def _look(found, leg, z, begin, to, end, met, fresh, crossed, sizes):
         found.time = max(found.time, abs(values[crossed, -1] / slopes[crossed, -1]))
 
 
-def _dip(leg, g, path, values, slopes, terms):
-    """The least value of a gap where it turns between two steps near its boundary."""
+def _dip(leg, g, path, length, values, slopes, terms):
+    """The least value of a gap where it turns between two steps, each of a length, near its
+    boundary.
+    """
     least, step = np.inf, None
     turns = (slopes[:-1] < 0) & (slopes[1:] > 0) & (values[:-1] > 0) & (values[1:] > 0)
     # a cubic's turn is below the ends by a quarter of the step times the slopes at most, and more
     near = np.minimum(values[:-1], values[1:]) < 0.05 * terms
     for i in np.flatnonzero(turns & near).tolist():
         if step is None:
-            step = expm(leg.matrix * (TURN / leg.fastest / PARTS))
+            step = expm(leg.matrix * (length / PARTS))
         z = path[:, i]
         for _ in range(PARTS):
             z = step @ z
