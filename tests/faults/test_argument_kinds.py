@@ -163,6 +163,10 @@ def test_arguments_of_another_kind_are_refused_in_words(only_arguments, seed, tr
             lambda: sl.plot.history(sine_run(), stat="x"),
             "plot.history has no argument 'stat'. Did you mean 'state'?",
         ),
+        (
+            lambda: sl.impact_statistics(rig, (0, 0), periods=1, force=np.array([1.0, 2.0])),
+            "force must be a mapping by the names of boundaries",
+        ),
         (lambda: sl.sqrt(-1.0), r"sl.sqrt\(-1.0\) has no finite real value"),
         (lambda: sl.sin([1.0]), "an equation holds"),
         (lambda: rig.with_values(force=np.str_("one")), "force = 'one' can't be read"),

@@ -36,7 +36,7 @@ def legs(rng, waves, count):
 def one_state(rates, rows, amplitudes, begin, length):
     """WaveLegs of a single contact state."""
     state = np.zeros(len(length), np.int64)
-    return WaveLegs(rates[None], rows[None], state, amplitudes, begin, length)
+    return WaveLegs(rates[None], rows[None], np.zeros(1, int), state, amplitudes, begin, length)
 
 
 def sampled(one, number=40_001):
@@ -61,16 +61,17 @@ def test_sums_of_random_waves(seed):
         )
 
     mean = integral(lambda t, q: q) / total
-    np.testing.assert_allclose(means(one), mean, atol=2e-5 * np.abs(mean).max())
+    np.testing.assert_allclose(means(one)[0], mean, atol=2e-5 * np.abs(mean).max())
     square = integral(lambda t, q: (q - mean) ** 2) / total
-    np.testing.assert_allclose(deviations(one, means(one)), np.sqrt(square), rtol=2e-4)
+    np.testing.assert_allclose(deviations(one, means(one))[0], np.sqrt(square), rtol=2e-4)
     wave = integral(lambda t, q: q * np.exp(-3j * t)[:, None]) * 2 / total
-    np.testing.assert_allclose(harmonics(one, 3.0), wave, atol=2e-4 * np.abs(wave).max())
+    found = harmonics(one, np.array([3.0]))[0]
+    np.testing.assert_allclose(found, wave, atol=2e-4 * np.abs(wave).max())
     seen = np.array(
         [np.min([q.min(axis=0) for _, q in dense], axis=0),
          np.max([q.max(axis=0) for _, q in dense], axis=0)]
     )  # fmt: skip
-    beyond = (extremes(one) - seen) * [[-1.0], [1.0]]
+    beyond = (extremes(one)[:, 0] - seen) * [[-1.0], [1.0]]
     assert (beyond >= 0.0).all()
     assert (beyond < 1e-4 * np.abs(seen).max()).all()
     for leg, (t, q) in enumerate(dense):
@@ -89,14 +90,15 @@ def test_a_cosine():
         np.array([1j * w, 0.0]), np.array([[3.0 + 0j, 0.5]]),
         np.array([[np.exp(1j * phi), 1.0]]), np.zeros(1), np.array([2 * np.pi / w]),
     )  # fmt: skip
-    np.testing.assert_allclose(extremes(one), [[-2.5], [3.5]], atol=1e-13)
-    assert means(one)[0] == pytest.approx(0.5, abs=1e-14)
-    assert deviations(one, means(one))[0] == pytest.approx(3 / np.sqrt(2), abs=1e-13)
-    np.testing.assert_allclose(harmonics(one, w), [3.0 * np.exp(1j * phi)], atol=1e-13)
+    np.testing.assert_allclose(extremes(one)[:, 0], [[-2.5], [3.5]], atol=1e-13)
+    assert means(one)[0, 0] == pytest.approx(0.5, abs=1e-14)
+    assert deviations(one, means(one))[0, 0] == pytest.approx(3 / np.sqrt(2), abs=1e-13)
+    found = harmonics(one, np.array([w]))
+    np.testing.assert_allclose(found, [[3.0 * np.exp(1j * phi)]], atol=1e-13)
     *_, when = turns(one, np.array([0]))
     np.testing.assert_allclose(np.sort(when), (np.array([1, 2]) * np.pi - phi) / w, atol=1e-12)
-    least = least_turns(one, np.array([0]), np.array([1e-3]))
-    np.testing.assert_allclose(least, [2.5], atol=1e-13)
+    least = least_turns(one, np.array([0]), np.array([[1e-3]]))
+    np.testing.assert_allclose(least, [[2.5]], atol=1e-13)
 
 
 @pytest.mark.parametrize("together", [0, 10**9])
@@ -108,7 +110,7 @@ def test_many_quantities_together_or_one_by_one(together, monkeypatch):
     leg, row, time = turns(one, np.arange(3))
     at = [one.values(leg, time)[np.arange(len(row)), row]]
     ends = [one.values(every, end) for end in (0.0 * one.length, one.length)]
-    for quantity, (low, high) in enumerate(extremes(one).T):
+    for quantity, (low, high) in enumerate(extremes(one)[:, 0].T):
         values = np.concatenate([at[0][row == quantity], *(end[:, quantity] for end in ends)])
         assert low == pytest.approx(values.min(), abs=1e-12)
         assert high == pytest.approx(values.max(), abs=1e-12)
@@ -124,12 +126,13 @@ def test_legs_of_several_contact_states_are_those_of_each():
         for name in ("rates", "rows", "amplitudes", "begin", "length")
     )
     rates, rows, *others = parts
-    whole = WaveLegs(rates, rows, state, *others)
+    whole = WaveLegs(rates, rows, np.zeros(3, int), state, *others)
     shares = [one.length.sum() / total for one in each]
     mean = sum(share * means(one) for share, one in zip(shares, each, strict=True))
     np.testing.assert_allclose(means(whole), mean, rtol=1e-13)
-    wave = sum(share * harmonics(one, 3.0) for share, one in zip(shares, each, strict=True))
-    np.testing.assert_allclose(harmonics(whole, 3.0), wave, rtol=1e-13)
+    rate = np.array([3.0])
+    wave = sum(share * harmonics(one, rate) for share, one in zip(shares, each, strict=True))
+    np.testing.assert_allclose(harmonics(whole, rate), wave, rtol=1e-13)
     square = sum(
         share * deviations(one, mean) ** 2 for share, one in zip(shares, each, strict=True)
     )
@@ -137,7 +140,7 @@ def test_legs_of_several_contact_states_are_those_of_each():
     every = np.array([extremes(one) for one in each])
     found = np.array([every[:, 0].min(axis=0), every[:, 1].max(axis=0)])
     np.testing.assert_allclose(extremes(whole), found, rtol=1e-13)
-    row, near = np.arange(3), np.full(3, 1e-3)
+    row, near = np.arange(3), np.full((1, 3), 1e-3)
     least = np.min([least_turns(one, row, near) for one in each], axis=0)
     np.testing.assert_allclose(least_turns(whole, row, near), least, rtol=1e-12)
 
@@ -151,7 +154,7 @@ def test_a_wave_that_dies_out_at_once():
     )  # fmt: skip
     time = (np.pi - np.arctan(a / w)) / w
     least = np.exp(-a * time) * np.cos(w * time)
-    np.testing.assert_allclose(extremes(one)[:, 0], [least, 1.0], rtol=1e-12)
+    np.testing.assert_allclose(extremes(one)[:, 0, 0], [least, 1.0], rtol=1e-12)
 
 
 def test_mean_squares_of_waves_of_every_speed():
@@ -166,7 +169,7 @@ def test_mean_squares_of_waves_of_every_speed():
     for leg, length in enumerate(one.length):
         q = one.values(np.full(len(places), leg), length * places)
         total += length / 800 * np.tile(weights, 400) @ (q - 0.25) ** 2
-    found = deviations(one, np.full(3, 0.25))
+    found = deviations(one, np.full((1, 3), 0.25))[0]
     np.testing.assert_allclose(found, np.sqrt(total / one.length.sum()), rtol=1e-12)
 
 
@@ -179,3 +182,31 @@ def test_largest_values_are_the_same_whether_many_are_looked_at_together(monkeyp
         found.append(extremes(one))
     for other in found[1:]:
         np.testing.assert_allclose(other, found[0], rtol=0, atol=1e-13 * np.abs(found[0]).max())
+
+
+def numbers(one):
+    """All that is found of motions, each [M, 3]."""
+    mean, rate, near = means(one), np.full(one.motions, 3.0), np.full((one.motions, 3), 1e-3)
+    found = (mean, deviations(one, mean), harmonics(one, rate), *extremes(one))
+    return [*found, least_turns(one, np.arange(3), near)]
+
+
+def test_motions_of_different_numbers_of_waves_together():
+    rng = np.random.default_rng(21)
+    each = [legs(rng, waves, count) for waves, count in ((5, 40), (7, 3), (4, 90), (6, 1))]
+    alone = zip(*(numbers(one) for one in each), strict=True)
+    for together, apart in zip(numbers(WaveLegs.joined(each)), alone, strict=True):
+        np.testing.assert_allclose(together, np.concatenate(apart), rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize("few", [0, 128, 1024])
+def test_numbers_of_a_motion_dont_depend_on_those_beside_it(monkeypatch, few):
+    """To the bit, also where its legs are looked at part by part."""
+    monkeypatch.setattr(waves, "HELD", 64 * 3 * 30)
+    monkeypatch.setattr(waves, "FEW", few)
+    monkeypatch.setattr(waves, "FEW_OF_EACH", few and 1)
+    rng = np.random.default_rng(22)
+    first, one, last = (legs(rng, 5, count) for count in (7, 100, 200))
+    whole = WaveLegs.joined([first, one, last])
+    for together, alone in zip(numbers(whole), numbers(one), strict=True):
+        np.testing.assert_array_equal(together[1], alone[0])

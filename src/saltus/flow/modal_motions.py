@@ -13,7 +13,7 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.modal import Modal, modal_flow
 from saltus.flow.modal_tables import Tables
 from saltus.flow.request import Outcome
-from saltus.flow.waves import WaveLegs
+from saltus.flow.waves import UNSEEN, WaveLegs, padded
 from saltus.language.expression import Expr
 
 #: Turns of a drive in a period that are whole to so much are whole [relative].
@@ -97,19 +97,14 @@ def _legs(
         legs.append(own)
     order, widest = np.concatenate(legs), max(len(one.rates) for one in known)
     return WaveLegs(
-        np.stack([_padded(one.rates, widest, -1.0) for one in known]),
-        np.stack([_padded(one.rows, widest) for one in known]),
+        np.stack([padded(one.rates, widest, UNSEEN) for one in known]),
+        np.stack([padded(one.rows, widest) for one in known]),
+        np.zeros(len(known), np.int64),
         np.repeat(np.arange(len(legs)), [len(own) for own in legs]),
-        np.concatenate([_padded(one, widest) for one in amplitudes]),
+        np.concatenate([padded(one, widest) for one in amplitudes]),
         counts[order] * period + phases[order],
         length[order],
     )
-
-
-def _padded(waves: np.ndarray, width: int, number: float = 0.0) -> np.ndarray:
-    """Waves with others before them, of which nothing is seen, [.., width]."""
-    more = np.full((*waves.shape[:-1], width - waves.shape[-1]), number, complex)
-    return np.concatenate([more, waves], axis=-1)
 
 
 def modal_rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray | None:

@@ -12,7 +12,7 @@ quantity turns at most once, Newton's method finds the place.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,13 +23,18 @@ TOLERANCE = 1e-14
 SETTLED = 4e-16
 #: One that is the last, relative to an interval in which a quantity turns once.
 LAST = 1e-8
-#: Most halvings of a leg.
-DEEPEST = 60
+#: Most halvings of a leg, and of one whose quantities are looked at together: turns are told from
+#: small values by their slopes, which only those that are looked at one by one have.
+DEEPEST, TOGETHER = 60, 6
 #: Numbers that an evaluation holds at a time: some 60 MB.
 HELD = 2**22
 #: The product of two waves that goes less far than this in a leg of mean length [rad] is integrated
 #: leg by leg: the difference of its values at both ends has lost digits.
-SLOW = 1.0
+SLOW = 0.1
+#: Magnitudes of turning points that are looked for one after the other, before all others.
+WIDER = (1.0, 30.0)
+#: Rate of a wave of which nothing is seen.
+UNSEEN = -1.0
 #: Share of all quantities in all intervals, and number of them, below which those that may hold
 #: what is looked for are looked at one by one.
 FEW_SHARE, FEW = 0.03, 1024
@@ -45,7 +50,8 @@ Wanted = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class WaveLegs:
-    """p legs of one motion through S contact states, with R quantities of E waves.
+    """p legs of M motions through S contact states, with R quantities of E waves. What is found of
+    a motion doesn't depend on the others, to the bit.
 
     Attributes
     ----------
@@ -53,8 +59,10 @@ class WaveLegs:
         mu [1/s].
     rows : complex128[S, R, E]
         What each wave adds to each quantity [its unit].
+    motion : int64[S]
+        Motion of each contact state, ascending from 0.
     state : int64[p]
-        Contact state of each leg, ascending.
+        Contact state of each leg, ascending from 0.
     amplitudes : complex128[p, E]
         Of the waves at the beginning of a leg.
     begin, length : float64[p]
@@ -63,10 +71,45 @@ class WaveLegs:
 
     rates: np.ndarray
     rows: np.ndarray
+    motion: np.ndarray
     state: np.ndarray
     amplitudes: np.ndarray
     begin: np.ndarray
     length: np.ndarray
+
+    @classmethod
+    def joined(cls, each: Sequence[WaveLegs]) -> WaveLegs:
+        """All motions of several, one after the other."""
+        widest = max(one.rates.shape[1] for one in each)
+        states = np.cumsum([0, *(len(one.rates) for one in each)])
+        motions = np.cumsum([0, *(one.motions for one in each)])
+
+        def put(name: str, number: float = 0.0) -> np.ndarray:
+            return np.concatenate([padded(getattr(one, name), widest, number) for one in each])
+
+        return cls(
+            put("rates", UNSEEN), put("rows"),
+            np.concatenate([one.motion + n for one, n in zip(each, motions, strict=False)]),
+            np.concatenate([one.state + n for one, n in zip(each, states, strict=False)]),
+            put("amplitudes"),
+            np.concatenate([one.begin for one in each]),
+            np.concatenate([one.length for one in each]),
+        )  # fmt: skip
+
+    @property
+    def motions(self) -> int:
+        """M."""
+        return int(self.motion[-1]) + 1
+
+    @functools.cached_property
+    def owner(self) -> np.ndarray:
+        """Motion of each leg, int64[p]."""
+        return np.asarray(self.motion[self.state])
+
+    @functools.cached_property
+    def duration(self) -> np.ndarray:
+        """Of each motion, float64[M, 1] [s]."""
+        return np.add.reduceat(self.length, _begins(self.owner))[:, None]
 
     def waves(self, leg: np.ndarray, time: np.ndarray) -> np.ndarray:
         """The waves on legs int64[m] at times float64[m] since their beginnings: complex128[m,
@@ -108,26 +151,49 @@ class WaveLegs:
         """Contact states, and which of legs int64[m] are in them, int64[..] each."""
         order = np.argsort(self.state[leg], kind="stable")
         states = self.state[leg][order]
-        for mine in np.split(order, np.flatnonzero(np.diff(states)) + 1 if len(order) else []):
+        for mine in np.split(order, _begins(states)[1:]):
             if len(mine):
                 yield int(self.state[leg[mine[0]]]), mine
 
-    def integrals(self, rates: np.ndarray) -> np.ndarray:
-        """The integral of e^{rate t} over each leg, rates complex128[p or 1, n]; complex128[p,
-        n].
+    def parts(self) -> Iterator[np.ndarray]:
+        """Legs to be looked at together, int64[m]: of each motion so many as an evaluation of all
+        quantities holds.
         """
-        at = rates * self.length[:, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            mean = np.where(at == 0.0, 1.0, np.expm1(at) / at)
-        result: np.ndarray = mean * self.length[:, None]
-        return result
+        most = max(1, HELD // (64 * self.rows.shape[1]))
+        part = _ranks(self.owner) // most
+        for number in range(int(part.max()) + 1):
+            yield np.flatnonzero(part == number)
 
-    def of_state(self, mine: np.ndarray) -> WaveLegs:
-        """Some legs of one contact state."""
-        return replace(
-            self, state=self.state[mine], amplitudes=self.amplitudes[mine],
-            begin=self.begin[mine], length=self.length[mine],
-        )  # fmt: skip
+    def integrals(self, rates: np.ndarray) -> np.ndarray:
+        """The integral of e^{rate t} over each leg, rates complex128[p, n]; complex128[p, n]."""
+        return _integrals(rates, self.length[:, None])
+
+
+def padded(waves: np.ndarray, width: int, number: float = 0.0) -> np.ndarray:
+    """Waves with others before them, of which nothing is seen, [.., width]."""
+    more = np.full((*waves.shape[:-1], width - waves.shape[-1]), number, complex)
+    return np.concatenate([more, waves], axis=-1)
+
+
+def _integrals(rates: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """The integral of e^{rate t} over lengths of time."""
+    at = rates * length
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = np.where(at == 0.0, 1.0, np.expm1(at) / at)
+    result: np.ndarray = mean * length
+    return result
+
+
+def _begins(groups: np.ndarray) -> np.ndarray:
+    """Where each group begins in int64[m], whose numbers stand together."""
+    return np.flatnonzero(np.diff(groups, prepend=-1))
+
+
+def _ranks(groups: np.ndarray) -> np.ndarray:
+    """Place of each in its group, int64[m]: 0, 1, .. in each of int64[m], ascending."""
+    begins = _begins(groups)
+    first = np.repeat(begins, np.diff(begins, append=len(groups)))
+    return np.asarray(np.arange(len(groups)) - first)
 
 
 def _real_product(waves: np.ndarray, turned: np.ndarray) -> np.ndarray:
@@ -140,129 +206,159 @@ def _real_product(waves: np.ndarray, turned: np.ndarray) -> np.ndarray:
 
 # -- means -----------------------------------------------------------------------------------------
 def means(one: WaveLegs) -> np.ndarray:
-    """Mean of each quantity, float64[R]."""
+    """Mean of each quantity, float64[M, R]."""
     total = _summed(one, one.amplitudes * one.integrals(one.rates[one.state]), one.rows)
-    return np.asarray(total.real / one.length.sum())
+    return np.asarray(total.real / one.duration)
 
 
 def _summed(one: WaveLegs, waves: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """The sum over all legs of waves complex128[p, E] times the rows complex128[S, R, E] of their
-    contact states, complex128[R].
+    contact states, complex128[M, R].
     """
-    sums = np.zeros((len(rows), waves.shape[1]), complex)
-    np.add.at(sums, one.state, waves)
-    return np.asarray(np.einsum("sre,se->r", rows, sums))
+    sums = np.add.reduceat(waves, _begins(one.state), axis=0)
+    return np.add.reduceat(np.einsum("sre,se->sr", rows, sums), _begins(one.motion), axis=0)
 
 
 def deviations(one: WaveLegs, mean: np.ndarray) -> np.ndarray:
-    """Root mean square of each quantity about its mean, float64[R]."""
-    total, every = np.zeros(len(mean)), np.arange(len(one.length))
-    ends = one.waves(every, one.length)
-    for state, mine in one.by_state(every):
-        rates, rows = one.rates[state], one.rows[state].copy()
-        rows[:, np.flatnonzero(rates == 0.0)[0]] -= mean  # the constant, of amplitude 1
-        part = one.of_state(mine)
-        for other in (np.asarray, np.conj):
-            product = _products(part, rates, ends[mine], other)
-            total += 0.5 * ((rows @ product) * other(rows)).sum(axis=1).real
-    return np.asarray(np.sqrt(np.maximum(total, 0.0) / one.length.sum()))
+    """Root mean square of each quantity about its mean float64[M, R], float64[M, R]."""
+    every = np.arange(len(one.rates))
+    rows, constant = one.rows.copy(), np.argmax(one.rates == 0.0, axis=1)
+    rows[every, :, constant] -= mean[one.motion]  # of amplitude 1
+    ends, total = one.waves(np.arange(len(one.length)), one.length), np.zeros(rows.shape[:2])
+    for other in (np.asarray, np.conj):
+        product = _products(one, ends, other)
+        total += 0.5 * ((rows @ product) * other(rows)).sum(axis=2).real
+    square = np.add.reduceat(total, _begins(one.motion), axis=0)
+    return np.asarray(np.sqrt(np.maximum(square, 0.0) / one.duration))
 
 
 def _products(
-    one: WaveLegs, single: np.ndarray, end: np.ndarray, other: Callable[[np.ndarray], np.ndarray]
+    one: WaveLegs, ends: np.ndarray, other: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
     """Integrals of the product of each wave with each one, or with its conjugate, over all legs of
-    a contact state with rates complex128[E], complex128[E, E]: the difference of the products at
-    the ends complex128[p, E] and at the beginnings, divided by their rates.
+    a contact state, complex128[S, E, E]: the difference of the products at the ends complex128[p,
+    E] and at the beginnings, divided by their rates.
     """
-    begin, rates = one.amplitudes, single[:, None] + other(single)
-    slow = np.abs(rates) * one.length.mean() < SLOW
-    difference = end.T @ other(end) - begin.T @ other(begin)
-    result: np.ndarray = np.where(slow, 0.0, difference / np.where(slow, 1.0, rates))
-    first, second = np.nonzero(np.triu(slow))  # the others are the same, or conjugates
-    slow_rates = rates[first, second][None]
-    step = max(1, HELD // (4 * len(first)))
-    for leg in range(0, len(begin), step):
-        some = one.of_state(np.arange(leg, min(leg + step, len(begin))))
-        both = some.amplitudes[:, first] * other(some.amplitudes[:, second])
-        result[first, second] += (both * some.integrals(slow_rates)).sum(axis=0)
-    result[second, first] = other(result[first, second])
+    rates = one.rates[:, :, None] + other(one.rates)[:, None, :]
+    begins, result = _begins(one.state), np.empty(rates.shape, complex)
+    count = np.diff(begins, append=len(one.state))
+    for number, (place, legs) in enumerate(zip(begins, count, strict=True)):
+        begin, end = one.amplitudes[place : place + legs], ends[place : place + legs]
+        result[number] = end.T @ other(end) - begin.T @ other(begin)
+    mean = np.add.reduceat(one.length, begins) / count
+    slow = np.abs(rates) * mean[:, None, None] < SLOW
+    result /= np.where(slow, 1.0, rates)
+    state, first, second = np.nonzero(np.triu(slow))  # the others are the same, or conjugates
+    sums = np.empty(len(state), np.complex128)
+    for part in _split(count[state], HELD // 16):
+        own = state[part]
+        pair = np.repeat(np.arange(len(own)), count[own])
+        leg = begins[own][pair] + _ranks(pair)
+        both = one.amplitudes[leg, first[part][pair]]
+        both = both * other(one.amplitudes[leg, second[part][pair]])
+        rate = rates[own, first[part], second[part]][pair]
+        sums[part] = np.add.reduceat(both * _integrals(rate, one.length[leg]), _begins(pair))
+    result[state, first, second] = sums
+    result[state, second, first] = other(sums)
     return result
 
 
-def harmonics(one: WaveLegs, rate: float) -> np.ndarray:
-    """Complex amplitude A e^{i phi} of A cos(rate t + phi) in each quantity, complex128[R]."""
-    back, rates = np.exp(-1j * rate * one.begin)[:, None], one.rates[one.state]
-    ahead = back * one.amplitudes * one.integrals(rates - 1j * rate)
-    mirrored = back * one.amplitudes.conj() * one.integrals(rates.conj() - 1j * rate)
+def _split(sizes: np.ndarray, held: int) -> Iterator[slice]:
+    """Parts of int64[n] that add up to a number each, or are one alone."""
+    first, total = 0, np.cumsum(sizes)
+    while first < len(sizes):
+        before = total[first] - sizes[first]
+        last = max(first + 1, int(np.searchsorted(total, before + held, side="right")))
+        yield slice(first, last)
+        first = last
+
+
+def harmonics(one: WaveLegs, rate: np.ndarray) -> np.ndarray:
+    """Complex amplitude A e^{i phi} of A cos(rate t + phi) in each quantity, complex128[M, R], at
+    rates float64[M] [rad/s].
+    """
+    turning = 1j * rate[one.owner]
+    back, rates = np.exp(-turning * one.begin)[:, None], one.rates[one.state]
+    ahead = back * one.amplitudes * one.integrals(rates - turning[:, None])
+    mirrored = back * one.amplitudes.conj() * one.integrals(rates.conj() - turning[:, None])
     total = _summed(one, ahead, one.rows) + _summed(one, mirrored, one.rows.conj())
-    return np.asarray(total / one.length.sum())
+    return np.asarray(total / one.duration)
 
 
 # -- largest and smallest values -------------------------------------------------------------------
 def extremes(one: WaveLegs) -> np.ndarray:
-    """Smallest and largest value of each quantity, float64[2, R]."""
-    found = np.full((one.rows.shape[1], 2), [np.inf, -np.inf]).T
-    every, legs = np.arange(found.shape[1]), np.arange(len(one.length))
+    """Smallest and largest value of each quantity, float64[2, M, R]."""
+    found = np.full((one.motions, one.rows.shape[1], 2), [np.inf, -np.inf]).transpose(2, 0, 1)
+    legs = np.arange(len(one.length))
     for time in (0.0 * one.length, 0.5 * one.length, one.length):
-        _see_all(found, every, one.values(legs, time))
+        _see_all(found, one.owner, one.values(legs, time))
     sizes = one.sizes(legs, 0.5 * one.length, 0.5 * one.length)
-    tolerance = np.zeros((len(one.rows), len(every)))
+    tolerance = np.zeros(one.rows.shape[:2])
     for state, mine in one.by_state(legs):
         tolerance[state] = TOLERANCE * (sizes[mine] @ one.row_sizes[state].T).max(axis=0)
 
     def beyond(leg: np.ndarray, row: np.ndarray, value: np.ndarray, room: np.ndarray) -> np.ndarray:
-        state = one.state[leg]
-        least = tolerance[state[:, None] if value.ndim == 2 else state, row]
-        low, high = found[:, row]
+        least, (low, high) = tolerance[one.state[leg], row], found[:, one.owner[leg], row]
         new: np.ndarray = (value - room < low - least) | (value + room > high + least)
         return new
 
-    block = max(1, HELD // (64 * len(every)))
-    for first in range(0, len(legs), block):
-        open_ = _open(one, legs[first : first + block], found, beyond)
+    for part in one.parts():
+        open_ = _open(one, part, found, beyond)
         leg, row, time = _turns(one, open_, beyond)
-        _see(found, row, _derivatives(one, leg, row, time)[0])
+        value = _derivatives(one, leg, row, time)[0]
+        np.minimum.at(found[0], (one.owner[leg], row), value)
+        np.maximum.at(found[1], (one.owner[leg], row), value)
     return found
 
 
-def _see(found: np.ndarray, row: np.ndarray, value: np.ndarray) -> None:
-    """Put values float64[m] of quantities int64[m] into the extremes float64[2, R]."""
-    np.minimum.at(found[0], row, value)
-    np.maximum.at(found[1], row, value)
-
-
-def _see_all(found: np.ndarray, row: np.ndarray, value: np.ndarray) -> None:
-    """Put values float64[m, r] of quantities int64[r] into the extremes float64[2, R]."""
-    found[0, row] = np.minimum(found[0, row], value.min(axis=0, initial=np.inf))
-    found[1, row] = np.maximum(found[1, row], value.max(axis=0, initial=-np.inf))
+def _see_all(found: np.ndarray, motion: np.ndarray, value: np.ndarray) -> None:
+    """Put values float64[m, R] of motions int64[m] into the extremes float64[2, M, R]; NaN are left
+    out.
+    """
+    order = np.argsort(motion, kind="stable")
+    begins = _begins(motion[order])
+    who = motion[order][begins]
+    found[0, who] = np.fmin(found[0, who], np.fmin.reduceat(value[order], begins, axis=0))
+    found[1, who] = np.fmax(found[1, who], np.fmax.reduceat(value[order], begins, axis=0))
 
 
 def _open(one: WaveLegs, leg: np.ndarray, found: np.ndarray, wanted: Wanted) -> Intervals:
-    """Intervals of legs in which quantities may be wanted, after some halvings: all quantities are
-    looked at together while they are many. What is seen on the way is put into ``found``.
+    """Intervals of legs in which quantities may be wanted, after some halvings: all quantities of a
+    motion are looked at together while they are many. What is seen on the way is put into
+    ``found``.
     """
     middle, half = 0.5 * one.length[leg], 0.5 * one.length[leg]
     open_ = np.ones((len(leg), one.rows.shape[1]), bool)
-    while open_.sum() > max(FEW_SHARE * open_.size, FEW, FEW_OF_EACH * len(leg)):
-        row = np.flatnonzero(open_.any(axis=0))
+    every, few = np.arange(one.rows.shape[1]), list[Intervals]()
+    for halvings in range(TOGETHER + 1):
+        owner = one.owner[leg]
+        legs, left = np.bincount(owner), np.bincount(owner, open_.sum(axis=1))
+        shared = max(FEW_SHARE * len(every), FEW_OF_EACH) * legs
+        many = (left > np.maximum(shared, FEW))[owner] & (halvings < TOGETHER)
+        at, row = np.nonzero(open_ & ~many[:, None])
+        few.append((leg[at], row, middle[at], half[at]))
+        leg, middle, half, open_ = leg[many], middle[many], half[many], open_[many]
+        if not len(leg):
+            break
         waves, reach = one.waves(leg, middle), _reach(one, leg, half)
         slow = np.where(reach < 1.0, waves, 0.0)
         slopes, rest = slow * one.rates[one.state[leg]], one.sizes(leg, middle, half)
         rest *= _remainder(reach)
-        value, room = np.empty((2, len(leg), len(row)))
+        value, room, seen = np.full((3, len(leg), len(every)), np.nan)
         for state, mine in one.by_state(leg):
-            rows = one.turned[state, row]
-            value[mine] = _real_product(slow[mine], rows)
+            row = np.flatnonzero(open_[mine].any(axis=0))
+            rows, at_all = one.turned[state, row], (mine[:, None], row)
+            value[at_all] = _real_product(slow[mine], rows)
             slope = np.abs(_real_product(slopes[mine], rows)) * half[mine, None]
-            room[mine] = slope + rest[mine] @ one.row_sizes[state, row].T
-            _see_all(found, row, _real_product(waves[mine], rows))
-        open_[:, row] &= wanted(leg, row, value, room)
+            room[at_all] = slope + rest[mine] @ one.row_sizes[state, row].T
+            seen[at_all] = _real_product(waves[mine], rows)
+        _see_all(found, one.owner[leg], seen)
+        open_ &= wanted(leg[:, None], every, value, room)
         on = open_.any(axis=1)
         leg, _, middle, half = _halves(leg[on], leg[on], middle[on], half[on])
         open_ = np.tile(open_[on], (2, 1))
-    at, row = np.nonzero(open_)
-    return leg[at], row, middle[at], half[at]
+    leg, row, middle, half = (np.concatenate(part) for part in zip(*few, strict=True))
+    return leg, row, middle, half
 
 
 def _reach(one: WaveLegs, leg: np.ndarray, half: np.ndarray) -> np.ndarray:
@@ -285,46 +381,45 @@ def _halves(leg: np.ndarray, row: np.ndarray, middle: np.ndarray, half: np.ndarr
 
 # -- turning points --------------------------------------------------------------------------------
 def least_turns(one: WaveLegs, rows: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Smallest magnitude of quantities int64[r] where they turn, float64[r], inf of those that
-    never do. Magnitudes up to ``near`` float64[r] are looked for first.
+    """Smallest magnitude of quantities int64[r] where they turn, float64[M, r], inf of those that
+    never do. Magnitudes up to ``near`` float64[M, r] are looked for first.
     """
-    least, open_ = np.array(near), np.ones(len(rows), bool)
-    for last in (False, True):
-        below, found = np.full((2, one.rows.shape[1]), np.inf)
-        below[rows] = least
+    asked, unseen = replace(one, rows=one.rows[:, rows]), np.zeros((2, *near.shape))
+    least, open_ = np.full(near.shape, np.inf), np.ones(near.shape, bool)
+    for wide in WIDER:
+        below = np.where(open_, np.minimum(wide * near, least), -np.inf)
 
         def low(
-            leg: np.ndarray,  # noqa: ARG001
-            row: np.ndarray,
-            value: np.ndarray,
-            room: np.ndarray,
+            leg: np.ndarray, row: np.ndarray, value: np.ndarray, room: np.ndarray
         ) -> np.ndarray:
-            return np.asarray(np.abs(value) - room <= below[row])  # noqa: B023
+            return np.asarray(np.abs(value) - room <= below[one.owner[leg], row])  # noqa: B023
 
-        leg, row, time = turns(one, rows[open_], low)
-        np.minimum.at(found, row, np.abs(_derivatives(one, leg, row, time)[0]))
-        least[open_] = found[rows[open_]]
-        open_ &= least > near
-        if last or not open_.any():
-            break
+        for part in asked.parts():
+            leg, row, time = _turns(asked, _open(asked, part, unseen, low), low)
+            size = np.abs(_derivatives(asked, leg, row, time)[0])
+            np.minimum.at(least, (one.owner[leg], row), size)
+        open_ &= least > wide * near
+        if not open_.any():
+            return least
+    leg, row = np.nonzero(open_[one.owner])
+    below = least
+    leg, row, time = _turns(asked, (leg, row, 0.5 * one.length[leg], 0.5 * one.length[leg]), low)
+    np.minimum.at(least, (one.owner[leg], row), np.abs(_derivatives(asked, leg, row, time)[0]))
     return least
 
 
-def turns(
-    one: WaveLegs, rows: np.ndarray, wanted: Wanted | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def turns(one: WaveLegs, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Legs int64[t], quantities int64[t] among ``rows`` int64[r], and times float64[t] since the
-    beginnings of the legs at which they turn, between the ends of the legs; those that aren't
-    ``wanted`` may be left out.
+    beginnings of the legs at which they turn, between the ends of the legs.
     """
     leg, row = np.repeat(np.arange(len(one.length)), len(rows)), np.tile(rows, len(one.length))
-    return _turns(one, (leg, row, 0.5 * one.length[leg], 0.5 * one.length[leg]), wanted)
+    return _turns(one, (leg, row, 0.5 * one.length[leg], 0.5 * one.length[leg]), None)
 
 
 def _turns(
     one: WaveLegs, at: Intervals, wanted: Wanted | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As :func:`turns`, in some intervals."""
+    """As :func:`turns`, in some intervals; those that aren't ``wanted`` may be left out."""
     once: list[tuple[np.ndarray, ...]] = [tuple(each[:0] for each in at)]
     block = max(1, HELD // (8 * one.rates.shape[1]))
     for _ in range(DEEPEST):

@@ -41,6 +41,9 @@ MOST_STEPS = 8
 #: A point nearer than this to the next place that is tried foretells the point there better than
 #: the cubic through the ends of the step, as a share of its length.
 BESIDE = 0.02
+#: How close a zero of a test is, and one from where Newton's method leads to a branch point: the
+#: root of a determinant is nearly a jump there, which takes a bisection. Shares of the place.
+CLOSE, NEARBY = 1e-14, 1e-2
 #: Farthest that a branch point lies from where it was seen, in units of the scale.
 FARTHEST = 0.3
 
@@ -194,10 +197,18 @@ def locate(
     steps, roots = _Steps(orbits, rows, z, tangent, kind), np.full(len(rows), np.nan)
     which, places = steps.folds()
     roots[which] = places
-    others = np.flatnonzero(np.isnan(roots))
-    roots[others] = zeros(
-        lambda flat, some: steps.at(flat, others[some]), steps.length[others], values[others]
-    )
+    crossed = kind == KINDS.index("branch_point")
+
+    def bracket(which: np.ndarray, close: float) -> None:
+        roots[which] = zeros(
+            lambda flat, some: steps.at(flat, which[some]),
+            steps.length[which],
+            values[which],
+            close,
+        )
+
+    bracket(np.flatnonzero(np.isnan(roots) & ~crossed), CLOSE)
+    bracket(np.flatnonzero(crossed), NEARBY)
     result: list[Event | None] = [None] * len(rows)
     known, near = steps.known, steps.orbits
     found = [i for i in sorted(known) if np.isfinite(roots[i])]
@@ -208,10 +219,16 @@ def locate(
         each = near.multipliers(ends, matrices, steps.rows[found])
         for place, multipliers in zip(found, each, strict=True):
             result[place] = replace(known[place], multipliers=multipliers)
-    for i in np.flatnonzero(kind == KINDS.index("branch_point")).tolist():
+
+    def crossing(i: int) -> Event | None:
         guess = z[i, 0] + 0.5 * steps.first[i] * steps.scale[i]
-        seen = known.get(i)
-        result[i] = _branch_point(near, i, guess if seen is None else seen.z, tangent[i, 0])
+        return _branch_point(near, i, known[i].z if i in known else guess, tangent[i, 0])
+
+    for i in np.flatnonzero(crossed).tolist():
+        result[i] = crossing(i)
+        if result[i] is None:
+            bracket(np.array([i]), CLOSE)
+            result[i] = crossing(i)
     return result
 
 
@@ -258,10 +275,12 @@ def zeros(
     at: Callable[[np.ndarray, np.ndarray], np.ndarray],
     length: np.ndarray,
     ends: np.ndarray | None = None,
+    close: float = CLOSE,
 ) -> np.ndarray:
     """Places at which functions of a distance vanish between 0 and float64[e], NaN where none is
     found: ``at`` gives their values at float64[r] for the functions int64[r], and is called at the
-    zeros last. ``ends``: their values at 0 and there float64[e, 2], if they are known.
+    zeros last. ``ends``: their values at 0 and there float64[e, 2], if they are known. ``close``:
+    how close the places are, as a share of them.
     """
     if not len(length):
         return length
@@ -281,7 +300,7 @@ def zeros(
         values,
         (np.zeros(len(length)), length),
         args=(which.astype(float),),
-        tolerances={"xrtol": 1e-14, "xatol": 1e-15, "fatol": 0.0, "frtol": 0.0},
+        tolerances={"xrtol": close, "xatol": 1e-15, "fatol": 0.0, "frtol": 0.0},
         maxiter=60,
     )
     at(root.x, which)

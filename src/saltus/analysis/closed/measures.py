@@ -10,6 +10,7 @@ at its samples and by the cubics between them.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -243,41 +244,48 @@ def _measured_by_waves(
     size = outcome.state.shape[1]
     result = unknown(len(motions), size, outputs)
     _count_contacts(map_, outcome, span, closed, result)
-    own, gaps = slice(0, outputs), outputs + np.array(margin_gaps(map_.system)[0], np.int64)
-    for i, legs in enumerate(motions):
-        check_stop()
-        if legs is None:
-            continue
-        low, high = extremes(legs)
-        wanted = replace(legs, rows=legs.rows[:, own])
-        mean = means(wanted)
-        result.maximum[i], result.minimum[i], result.mean[i] = high[own], low[own], mean
-        result.deviation[i] = deviations(wanted, mean)
-        if map_.system.forced_at is not None:
-            rate = 2.0 * np.pi / float(map_.period[i])
-            result.harmonic[i] = harmonics(wanted, rate)
-        spans = (high - low)[gaps]
-        margins = least_turns(legs, gaps, NEAR * spans)
-        result.margin[i], result.span[i] = margins.min(initial=np.inf), spans.max(initial=0.0)
-        result.turning[i] = _turning_states(legs, size, closed)
+    known = np.array([i for i, one in enumerate(motions) if one is not None], np.int64)
+    if not len(known):
+        return result
+    legs = WaveLegs.joined([one for one in motions if one is not None])
+    gaps = outputs + np.array(margin_gaps(map_.system)[0], np.int64)
+    check_stop()
+    low, high = extremes(legs)
+    result.maximum[known], result.minimum[known] = high[:, :outputs], low[:, :outputs]
+    wanted = replace(legs, rows=legs.rows[:, :outputs])
+    result.mean[known] = mean = means(wanted)
+    result.deviation[known] = deviations(wanted, mean)
+    if map_.system.forced_at is not None:
+        period = np.broadcast_to(map_.period, len(motions))[known]
+        result.harmonic[known] = harmonics(wanted, 2.0 * np.pi / period)
+    check_stop()
+    spans = (high - low)[:, gaps]
+    result.margin[known] = least_turns(legs, gaps, NEAR * spans).min(axis=1, initial=np.inf)
+    result.span[known] = spans.max(axis=1, initial=0.0)
+    for i, states in zip(known, _turning_states(legs, size, closed), strict=True):
+        result.turning[i] = states
     return result
 
 
-def _turning_states(legs: WaveLegs, size: int, closed: bool) -> np.ndarray:
-    """The states where the first one turns, float64[n, D], in the order of time: inside legs, and
-    where one ends and the next begins.
+def _turning_states(legs: WaveLegs, size: int, closed: bool) -> Iterator[np.ndarray]:
+    """The states where the first one turns, float64[n, D], in the order of time, motion by motion:
+    inside legs, and where one ends and the next begins.
     """
     states = replace(legs, rows=legs.rows[:, :size])
     leg, _, time = turns(legs, np.zeros(1, np.int64))
-    every = np.argsort(legs.begin)
     moving = replace(legs, rows=legs.rows[:, :1] * legs.rates[:, None])
-    first, last = (moving.values(every, at[every])[:, 0] for at in (0.0 * legs.length, legs.length))
-    before = np.roll(last, 1)
-    before[0] = before[0] if closed else 0.0
-    joints = every[before * first < 0.0]
-    when = np.concatenate([legs.begin[leg] + time, legs.begin[joints]])
-    points = np.concatenate([states.values(leg, time), states.values(joints, 0.0 * joints)])
-    return np.asarray(points[np.argsort(when, kind="stable")])
+    every = np.arange(len(legs.length))
+    first, last = (moving.values(every, at)[:, 0] for at in (0.0 * legs.length, legs.length))
+    for motion in range(legs.motions):
+        own = np.flatnonzero(legs.owner == motion)
+        own = own[np.argsort(legs.begin[own])]
+        before = np.roll(last[own], 1)
+        before[0] = before[0] if closed else 0.0
+        joints = own[before * first[own] < 0.0]
+        inside = legs.owner[leg] == motion
+        when = np.concatenate([legs.begin[leg[inside]] + time[inside], legs.begin[joints]])
+        points = [states.values(leg[inside], time[inside]), states.values(joints, 0.0 * joints)]
+        yield np.concatenate(points)[np.argsort(when, kind="stable")]
 
 
 @dataclass(frozen=True)

@@ -150,8 +150,8 @@ def impact_statistics(
         )
     if not system.guards:
         raise ParameterError(f"{system.name} has no boundary, so there is no contact to count.")
-    forces = _by_guard(system, force or {}, "force")
-    sides = contact_sides(system, _by_guard(system, contact_side or {}, "contact_side"))
+    forces = _by_guard(system, force, "force")
+    sides = contact_sides(system, _by_guard(system, contact_side, "contact_side"))
     stops = [
         number
         for number, guard in enumerate(system.guards)
@@ -195,9 +195,9 @@ def impact_statistics(
     return result
 
 
-def _by_guard(system: System, given: Mapping[str, Any], argument: str) -> dict[int, Any]:
-    """A mapping by the names of guards, by their numbers."""
-    names = [guard.name for guard in system.guards]
+def _by_guard(system: System, given: Mapping[str, Any] | None, argument: str) -> dict[int, Any]:
+    """A mapping by the names of guards, by their numbers; empty if there is none."""
+    names, given = [guard.name for guard in system.guards], {} if given is None else given
     if not isinstance(given, Mapping):
         raise must_be(argument, f"a mapping by the names of boundaries: {listed(names)}", given)
     for name in given:
