@@ -185,7 +185,7 @@ def _integrals(rates: np.ndarray, length: np.ndarray) -> np.ndarray:
 
 
 def _begins(groups: np.ndarray) -> np.ndarray:
-    """Where each group begins in int64[m], whose numbers stand together."""
+    """First place of each group in int64[m], whose numbers stand together."""
     return np.flatnonzero(np.diff(groups, prepend=-1))
 
 

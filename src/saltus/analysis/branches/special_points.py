@@ -41,7 +41,7 @@ MOST_STEPS = 8
 #: A point nearer than this to the next place that is tried foretells the point there better than
 #: the cubic through the ends of the step, as a share of its length.
 BESIDE = 0.02
-#: How close a zero of a test is, and one from where Newton's method leads to a branch point: the
+#: Closeness of a zero of a test, and of one from where Newton's method leads to a branch point: the
 #: root of a determinant is nearly a jump there, which takes a bisection. Shares of the place.
 CLOSE, NEARBY = 1e-14, 1e-2
 #: Farthest that a branch point lies from where it was seen, in units of the scale.
