@@ -286,3 +286,24 @@ def test_rates_by_modes_are_those_of_the_equations():
     map_ = Stroboscope(system, sl.Modal()).rows(np.zeros(6, np.int64))
     rates = field_of(system, start, map_.values)
     np.testing.assert_allclose(modal_rates(map_, start), rates, rtol=0, atol=1e-12 * rates.max())
+
+
+def test_a_structure_without_contacts_has_the_response_of_its_matrices():
+    """Twelve modes of a chain: |(K - w^2 M + i w C)^-1 f|."""
+    n = 12
+    mass, stiff = np.eye(n), 1e4 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    damp, names = 2e-4 * stiff, [f"u{i}" for i in range(n)]
+    chain = sl.structure(
+        mass, stiff, damp, names=names, modes=n, forces=[sl.Force("u3", "2 N")],
+        frequency="5 Hz", sensors={"end": "u11"},
+    )  # fmt: skip
+    found = sl.frequency_response(chain, ("5 Hz", "25 Hz", 3), progress=False)
+    rates = 2 * np.pi * found.frequency.values
+    wanted = [
+        np.abs(np.linalg.solve(stiff - w**2 * mass + 1j * w * damp, 2.0 * np.eye(n)[3])[11])
+        for w in rates
+    ]
+    rows = found.response_of.values.ravel()
+    peak = found.output_maximum.sel(output="end").values[rows]
+    np.testing.assert_allclose(peak, wanted, rtol=1e-9)
+    assert np.isinf(found.response_margin.values).all()

@@ -384,6 +384,8 @@ def least_turns(one: WaveLegs, rows: np.ndarray, near: np.ndarray) -> np.ndarray
     """Smallest magnitude of quantities int64[r] where they turn, float64[M, r], inf of those that
     never do. Magnitudes up to ``near`` float64[M, r] are looked for first.
     """
+    if not near.size:  # a structure without contacts
+        return near
     asked, unseen = replace(one, rows=one.rows[:, rows]), np.zeros((2, *near.shape))
     least, open_ = np.full(near.shape, np.inf), np.ones(near.shape, bool)
     for wide in WIDER:
