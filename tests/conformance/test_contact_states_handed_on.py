@@ -10,6 +10,7 @@ import pytest
 import saltus as sl
 from saltus.flow.maps import Stroboscope
 from saltus.flow.modal import modal_flow
+from saltus.flow.modal_tables import HANDED
 from saltus.kernels.modal import layout
 
 MASS = np.diag([1.0, 2.0, 1.5])
@@ -67,3 +68,21 @@ def test_derivatives_are_made_of_those_that_a_motion_comes_to():
     links = tables.by(names).links
     assert (links.table[: links.used, layout.SLOPES] >= 0).sum() == len(met)
     assert len(tables._handed[tables.set_of(np.array(rows[1]))]) > len(met)
+
+
+def test_those_that_a_motion_comes_to_are_handed_on_for_ever():
+    """Others, which no motion has come to since, only so many times."""
+    tables, every = modal_flow(CHAIN).tables, 2**3 - 1
+    tables.clear()
+    rows = [
+        np.array(list(CHAIN.with_values(frequency=0.6 + 1e-4 * k).values.values()))
+        for k in range(HANDED + 3)
+    ]
+    tables.state_of(tables.set_of(rows[0]), every)
+    tables.state_of(tables.set_of(rows[0]), 0)
+    first = tables.made[tables.state_of(tables.set_of(rows[0]), every)][0]
+    for row in rows[1:]:
+        assert tables.made[tables.state_of(tables.set_of(row), every)][0] is first
+    last = tables._handed[tables.set_of(rows[-1])]
+    assert last == {every: 0}
+    assert len(tables._handed[tables.set_of(rows[-3])]) == 2

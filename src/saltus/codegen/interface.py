@@ -255,6 +255,7 @@ MODAL = Interface(
         "modal/laws",
         "modal/impacts",
         "modal/friction",
+        "modal/columns",
         "modal/tangents",
         "modal/touches",
         "modal/ends",

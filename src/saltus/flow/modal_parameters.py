@@ -25,8 +25,9 @@ from saltus.kernels.modal import layout
 from saltus.language import expression as ex
 from saltus.system.linear import LinearPiece, LinearSystem
 
-#: Contact states whose differentiated equations are kept: those of some periods.
-KEPT = 64
+#: Contact states whose differentiated equations are kept: those of some periods at least, and as
+#: many as fit into so many bytes.
+KEPT, KEPT_BYTES = 64, 2**25
 #: Sets of values through which the derivatives of a contact state are made with those of others,
 #: without a motion that asks for them: a chaotic motion at the same values leaves hundreds of
 #: states, of which an orbit needs a few.
@@ -103,29 +104,36 @@ class ParameterTables:
         self.rows, self.shifts = Rows(), Rows(max(len(names) * self._width, 1))
         #: Derivatives of the equations, by the parameters and the values that they depend on.
         self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
-        self._piece = functools.lru_cache(maxsize=KEPT)(self._piece_of)
+        kept = max(KEPT, KEPT_BYTES // (8 * (LANES * state_groups) ** 2))
+        self._piece = functools.lru_cache(maxsize=kept)(self._piece_of)
         self._every, self.links = links, Links(links.table.shape[1])
         #: Contact states that were asked for, each with the number of sets since then; the last
         #: set.
         self._asked: dict[int, int] = {}
         self._last = -1
 
-    def wanted(self, which: int, mode: int, known: Collection[int]) -> list[int]:
-        """A contact state that a motion has come to, and those of the ``known`` ones of its set
-        that others came to in the last sets.
-        """
+    def ask(self, which: int, mode: int) -> None:
+        """Note that a motion has come to a contact state of a set."""
         if which != self._last:
             self._asked = {one: age + 1 for one, age in self._asked.items() if age < REMEMBERED}
             self._last = which
         self._asked[mode] = 0
+
+    def has(self, number: int) -> bool:
+        """True if the derivatives of a contact state have been made."""
+        return bool(number < self.links.used and self.links.table[number, layout.SLOPES] >= 0)
+
+    def wanted(self, known: Collection[int]) -> list[int]:
+        """The contact states, of ``known`` ones, that motions came to in the last sets."""
         return [one for one in self._asked if one in known]
 
     def need(self, numbers: Sequence[int], which: int, modes: Sequence[int]) -> None:
         """Make the derivatives of contact states of one set of values, and of this set."""
         while self.shifts.used <= which:
             self.shifts.add(self._shifts_of(self._sets[self.shifts.used]))
-        while self.links.used < len(self._made):
-            self.links.add(np.full(self.links.table.shape[1], -1))
+        if self.links.used < len(self._made):
+            new = len(self._made) - self.links.used
+            self.links.add(np.full((new, self.links.table.shape[1]), -1))
         left = self.links.table[numbers, layout.SLOPES] < 0
         if left.any():
             some, sides = np.array(numbers)[left], np.array(modes)[left].tolist()

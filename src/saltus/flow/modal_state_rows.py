@@ -9,9 +9,9 @@ from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_eigen import shared_of
 from saltus.flow.modal_modes import StateModes
 
-#: Modes from which on L and V share the shapes: with 60, all contact states of a beam against eight
-#: stops lie in a cache.
-SHARED = 64
+#: Modes from which on L and V share the shapes: a chaotic motion comes to hundreds of contact
+#: states, whose tables come from memory.
+SHARED = 32
 
 
 def modes_rows(

@@ -43,7 +43,7 @@ SET_BYTES = 4096
 #: Sets of values among which the nearest to a new one is looked for.
 NEAR = 64
 #: Sets through which a contact state is handed on, each from the one before, without a motion that
-#: has asked for it: a motion that still comes to it asks again.
+#: has asked for it.
 HANDED = 32
 
 
@@ -232,7 +232,7 @@ class Tables:
             self._hand_on(which)
         if (which, mode) not in self._states:
             self._make(which, mode)
-            self._handed[which][mode] = 0
+        self._handed[which][mode] = 0
         return self._states[which, mode]
 
     def need(self, which: int, names: tuple[str, ...], mode: int) -> None:
@@ -240,8 +240,10 @@ class Tables:
         those others of the set that motions with such derivatives have come to in sets before.
         """
         slopes = self.by(names)
-        modes = slopes.wanted(which, mode, self._handed[which])
-        slopes.need([self._states[which, one] for one in modes], which, modes)
+        slopes.ask(which, mode)
+        if not slopes.has(self._states[which, mode]):
+            modes = slopes.wanted(self._handed[which])
+            slopes.need([self._states[which, one] for one in modes], which, modes)
 
     def _make(self, which: int, mode: int) -> None:
         given = self.sets[which]

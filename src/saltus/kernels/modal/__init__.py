@@ -11,6 +11,7 @@ places            where a gap crosses
 laws              impacts, contacts at rest, their release
 impacts           several impacts at one instant
 friction          friction that sticks and slides
+columns           columns of the derivative, several side by side
 tangents          the derivative of the state with respect to the start and to parameters
 touches           tangencies
 ends              what a run leaves to the next one

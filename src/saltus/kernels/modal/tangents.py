@@ -201,79 +201,6 @@ def column_after(i, at, c, tau, h, batch, m):
     state_of(modes, m.column, m)
 
 
-@inner
-def add_rows(table, source, begin, end, target, step, m):
-    """Add a product with rows of a table of modes to four numbers of the columns side by side: rows
-    of `column` from `target` on, `step` apart. Row table + k is for the number k from `source` on.
-    """
-    a, b = load(m.column, target, LANES), load(m.column, target + 1, LANES)
-    c, d = load(m.column, target + step, LANES), load(m.column, target + step + 1, LANES)
-    e, f = load(m.column, target + 2 * step, LANES), load(m.column, target + 2 * step + 1, LANES)
-    g, h = load(m.column, target + 3 * step, LANES), load(m.column, target + 3 * step + 1, LANES)
-    for k in range(begin, end):
-        x, y = load(m.column, source + 2 * k, LANES), load(m.column, source + 2 * k + 1, LANES)
-        p, q, r, s = (
-            m.modes[table + k, 0],
-            m.modes[table + k, 1],
-            m.modes[table + k, 2],
-            m.modes[table + k, 3],
-        )
-        a, b, c, d = fma(x, p, a), fma(y, p, b), fma(x, q, c), fma(y, q, d)
-        e, f, g, h = fma(x, r, e), fma(y, r, f), fma(x, s, g), fma(y, s, h)
-    store(m.column, target, a)
-    store(m.column, target + 1, b)
-    store(m.column, target + step, c)
-    store(m.column, target + step + 1, d)
-    store(m.column, target + 2 * step, e)
-    store(m.column, target + 2 * step + 1, f)
-    store(m.column, target + 3 * step, g)
-    store(m.column, target + 3 * step + 1, h)
-
-
-@kernel
-def several_after(i, modes, c, count, batch, m):
-    """Columns of the derivative with respect to the start, `count` from c on, after the time of
-    `factor`, to `columns`: side by side in two lanes for each number, so that what is read of the
-    tables serves them all.
-    """
-    states, columns = m.sizes[STATES], m.sizes[TANGENTS]
-    groups, blocks, runs = m.sizes[MODE_GROUPS], m.sizes[STATE_GROUPS], runs_of(modes, m)
-    first, tables = m.sizes[ROWS], modes + 3 * groups
-    waves = first + 2 * LANES * blocks
-    for row in range(first, waves + 4 * LANES * groups):
-        store(m.column, row, splat(0.0, LANES))
-    for r in range(states):
-        for j in range(count):
-            number_of = batch.state[i, states + columns * r + c + j]
-            m.column[first + 2 * r + j // LANES, j % LANES] = number_of
-    for g in range(2 * groups):
-        part, group = g // groups, g % groups
-        for run in range(0, 4, 2):
-            begin, end = m.modes[runs + group, run], m.modes[runs + group, run + 1]
-            add_rows(
-                tables + g * LANES * blocks, first, LANES * int(begin), LANES * int(end),
-                waves + 4 * LANES * group + 2 * part, 4, m,
-            )  # fmt: skip
-    for row in range(first, waves):
-        store(m.column, row, splat(0.0, LANES))
-    for k in range(LANES * groups):
-        a, b = number(m.factor, 0, k), number(m.factor, groups, k)
-        for row in range(waves + 4 * k, waves + 4 * k + 2):
-            x, y = load(m.column, row, LANES), load(m.column, row + 2, LANES)
-            store(m.column, row, fma(y, -b, x * a))
-            store(m.column, row + 2, fma(x, b, y * a))
-    for s in range(blocks):
-        for run in range(0, 4, 2):
-            begin, end = m.modes[runs + groups + s, run], m.modes[runs + groups + s, run + 1]
-            add_rows(
-                tables + 2 * groups * LANES * (blocks + s), waves, 2 * LANES * int(begin),
-                2 * LANES * int(end), first + 2 * LANES * s, 2, m,
-            )  # fmt: skip
-    for r in range(states):
-        for j in range(count):
-            m.columns[r, c + j] = m.column[first + 2 * r + j // LANES, j % LANES]
-
-
 @kernel
 def columns_after(i, at, tau, h, batch, m):
     """The derivative a time h after it was moved last in a contact state, to `columns`. Sets
@@ -284,7 +211,7 @@ def columns_after(i, at, tau, h, batch, m):
         a, b = factor_of(modes, g, h, m)
         store(m.factor, g, a)
         store(m.factor, groups + g, b)
-    alone = h == 0.0 or coordinates_of(modes, m) > 0 or block_groups(modes, m) > 0
+    alone = h == 0.0 or block_groups(modes, m) > 0
     c = 0
     while c < m.sizes[TANGENTS]:
         count = min(min(m.sizes[TANGENTS], states) - c, 2 * LANES)
