@@ -210,3 +210,24 @@ def test_numbers_of_a_motion_dont_depend_on_those_beside_it(monkeypatch, few):
     whole = WaveLegs.joined([first, one, last])
     for together, alone in zip(numbers(whole), numbers(one), strict=True):
         np.testing.assert_array_equal(together[1], alone[0])
+
+
+def test_intervals_of_a_motion_are_halved_as_if_it_were_alone(monkeypatch):
+    """A short motion is looked at one quantity after the other, also beside a long one."""
+    monkeypatch.setattr(waves, "FEW", 64)
+    monkeypatch.setattr(waves, "FEW_OF_EACH", 1)
+    rng = np.random.default_rng(23)
+    short, long = (legs(rng, 5, count) for count in (7, 100))
+
+    def all_are(leg, row, value, room):
+        return np.ones_like(value, dtype=bool)
+
+    def opened(one):
+        every = np.arange(len(one.length))
+        return waves._open(one, every, np.zeros((2, one.motions, 3)), all_are)
+
+    leg, row, middle, half = opened(WaveLegs.joined([short, long]))
+    for together, alone in zip((leg, row, middle, half), opened(short), strict=True):
+        np.testing.assert_array_equal(together[leg < 7], alone)
+    assert (half[leg < 7] == 0.5 * short.length[leg[leg < 7]]).all()
+    assert (half[leg >= 7] < 0.5 * long.length[leg[leg >= 7] - 7]).all()

@@ -52,3 +52,44 @@ def test_bifurcations_are_located_to_rounding_by_few_evaluations(kind, most):
     for event, (_, height) in zip(found, axes, strict=True):
         np.testing.assert_allclose(event.z, [0.0, height], rtol=0, atol=CLOSED)
         assert abs(event.tangent[1]) < 1e-14
+
+
+class CrossingAsOrbits:
+    """x arctan(slope (p - 0.0123)) = 0 over p: along x = 0 another branch crosses at 0.0123."""
+
+    scale = np.ones((1, 2))
+
+    def __init__(self, slope):
+        self.slope = slope
+
+    def near(self, z, rows):
+        return self
+
+    def evaluate(self, z, rows):
+        x, p = z[:, 0], self.slope * (z[:, 1] - 0.0123)
+        by_p = x * self.slope / (1.0 + p**2)
+        return (x * np.arctan(p))[:, None], np.stack([np.arctan(p), by_p], axis=1)[:, None]
+
+    def multipliers(self, z, derivative, rows):
+        return derivative[:, 0, :1] + 10.0 + 0j
+
+
+@pytest.mark.parametrize(("slope", "tries"), [(1.0, 1), (3e4, 2)])
+def test_a_branch_point_is_looked_for_from_nearer_where_newtons_method_fails(
+    monkeypatch, slope, tries
+):
+    """The arctangent throws Newton's method off from 1.4 over its slope on."""
+    guesses, find = [], special_points._branch_point
+
+    def branch_point(orbits, row, start, along):
+        guesses.append(abs(start[1] - 0.0123))
+        return find(orbits, row, start, along)
+
+    monkeypatch.setattr(special_points, "_branch_point", branch_point)
+    curves, z = CrossingAsOrbits(slope), np.array([[[0.0, -0.03], [0.0, 0.05]]])
+    tangent = np.array([[[0.0, 1.0], [0.0, 1.0]]])
+    number = np.array([special_points.KINDS.index("branch_point")])
+    values = np.arctan(slope * (z[:, :, 1] - 0.0123))
+    (event,) = special_points.locate(curves, np.zeros(1, int), z, tangent, number, values)
+    np.testing.assert_allclose(event.z, [0.0, 0.0123], atol=1e-13)
+    assert len(guesses) == tries
