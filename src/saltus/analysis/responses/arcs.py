@@ -46,7 +46,7 @@ TAKEN = 8
 #: memory, and for their cube in work.
 MOST_UNKNOWNS = 400
 #: Most work on the branches of responses, see :class:`saltus.analysis.branches.watch.Watch`: 470
-#: points of 80 states, some ten seconds.
+#: points of 80 states, ten seconds to forty by the machine and the orbits.
 MOST_WORK = 3e6
 #: Largest distance of a response of an inexact method from its exact orbit, in units of its range.
 INEXACT = 0.05
