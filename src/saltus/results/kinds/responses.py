@@ -122,7 +122,8 @@ def _ends(ds: xr.Dataset) -> list[str]:
     if "points" in ends:
         lines.append(
             f"stopped  {counted(ends['points'], 'end')} of branches that go on, after 1000 points "
-            "or all the work: their orbits may grow without bound"
+            "or all the work: a narrower range follows them farther, if their orbits don't grow "
+            "without bound"
         )
     return lines
 
