@@ -4,6 +4,8 @@ exponentials.
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -16,6 +18,7 @@ from saltus.analysis.closed.measures import measure
 from saltus.analysis.inputs.outputs import states_alone
 from saltus.flow import modal_state_rows
 from saltus.flow.maps import Stroboscope
+from saltus.flow.modal_eigen import shared_of
 from saltus.flow.modal_motions import modal_rates, wave_motions
 
 
@@ -307,3 +310,60 @@ def test_a_structure_without_contacts_has_the_response_of_its_matrices():
     peak = found.output_maximum.sel(output="end").values[rows]
     np.testing.assert_allclose(peak, wanted, rtol=1e-9)
     assert np.isinf(found.response_margin.values).all()
+
+
+def random_chain(seed):
+    """A chain of 4 to 40 masses, some in two parts, by some of its modes, with one to four stops
+    that touch without a damper.
+    """
+    rng = np.random.default_rng(seed)
+    masses = int(rng.integers(4, 41))
+    stiffness = 400.0 * (2 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1))
+    if rng.random() < 0.3:
+        half = masses // 2
+        stiffness[half:, :half] = stiffness[:half, half:] = 0.0
+    stops = [
+        sl.Contact(
+            f"x{place}", stiffness=float(10 ** rng.uniform(2, 4)), name=f"stop_{place}",
+            gap=float(rng.uniform(0.005, 0.06)), side=str(rng.choice(["upper", "lower", "both"])),
+        )
+        for place in rng.choice(masses, int(rng.integers(1, 5)), replace=False) + 1
+    ]  # fmt: skip
+    return sl.structure(
+        np.eye(masses), stiffness, damping_ratio=0.02, modes=int(rng.integers(4, masses + 1)),
+        forces=[sl.Force(f"x{masses}", 20.0, name="last"), sl.Force("x1", 9.0, name="first")],
+        names=[f"x{place + 1}" for place in range(masses)], contacts=stops, frequency=2.3,
+    )  # fmt: skip
+
+
+def check_by_shapes(seed, monkeypatch):
+    """The derivative of a motion of a random chain by shapes alone is that by eigenvectors and
+    their inverse.
+    """
+    found, tables, start = [], [], None
+    for shared in (1, 10**9):
+        monkeypatch.setattr(modal_state_rows, "SHARED", shared)
+        monkeypatch.setattr(
+            modal_state_rows, "shared_of", lambda *of: tables.append(shared_of(*of)) or tables[-1]
+        )
+        map_ = Stroboscope(random_chain(seed), sl.Modal(), threads=1)
+        if start is None:
+            start = map_.ends(np.zeros((1, len(map_.states))), 7)[0]
+        found.append(map_.tangent(start, 2))
+    (ends, exact), (others, other) = reversed(found)
+    np.testing.assert_allclose(others, ends, rtol=0, atol=1e-9 * np.abs(ends).max())
+    assert np.abs(other - exact).max() < 1e-8 * np.abs(exact).max()
+    assert any(one is not None for one in tables)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_derivatives_by_shapes_are_those_by_eigenvectors(seed, monkeypatch):
+    check_by_shapes(seed, monkeypatch)
+
+
+@pytest.mark.nightly
+def test_so_are_those_of_a_hundred_chains(monkeypatch):
+    seed = int(time.time())
+    print(f"seed {seed}")
+    for one in range(100):
+        check_by_shapes(seed + one, monkeypatch)

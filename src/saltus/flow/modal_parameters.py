@@ -26,8 +26,8 @@ from saltus.language import expression as ex
 from saltus.system.linear import LinearPiece, LinearSystem
 
 #: Contact states whose differentiated equations are kept: those of some periods at least, and as
-#: many as fit into so many bytes.
-KEPT, KEPT_BYTES = 64, 2**25
+#: many as fit into so many bytes, but no more than a chaotic motion comes to.
+KEPT, KEPT_BYTES, MOST_KEPT = 64, 2**25, 512
 #: Sets of values through which the derivatives of a contact state are made with those of others,
 #: without a motion that asks for them: a chaotic motion at the same values leaves hundreds of
 #: states, of which an orbit needs a few.
@@ -104,7 +104,7 @@ class ParameterTables:
         self.rows, self.shifts = Rows(), Rows(max(len(names) * self._width, 1))
         #: Derivatives of the equations, by the parameters and the values that they depend on.
         self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
-        kept = max(KEPT, KEPT_BYTES // (8 * (LANES * state_groups) ** 2))
+        kept = int(np.clip(KEPT_BYTES // (8 * (LANES * state_groups) ** 2), KEPT, MOST_KEPT))
         self._piece = functools.lru_cache(maxsize=kept)(self._piece_of)
         self._every, self.links = links, Links(links.table.shape[1])
         #: Contact states that were asked for, each with the number of sets since then; the last
