@@ -246,6 +246,7 @@ MODAL = Interface(
     arguments=(*BATCH, *_MODAL_TABLES, *_MODAL_WORK),
     layout="modal/layout",
     templates=(
+        "exponential",
         "modal/records",
         "modal/blocks",
         "modal/series",
@@ -261,6 +262,19 @@ MODAL = Interface(
         "modal/ends",
         "modal/steps",
     ),
+    sizes=(),
+    flags=(),
+    tables=MappingProxyType({}),
+    functions=MappingProxyType({}),
+    truths=(),
+)
+
+#: Where sums of waves turn, which doesn't depend on an equation.
+WAVES = Interface(
+    entry="search",
+    arguments=(_I1, _F2, _F2, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2, _I1),
+    layout="",
+    templates=("exponential", "waves/layout", "waves/sums", "waves/search"),
     sizes=(),
     flags=(),
     tables=MappingProxyType({}),

@@ -24,6 +24,7 @@ from saltus.codegen.interface import (
     NDF,
     PAIR,
     TAYLOR,
+    WAVES,
     Interface,
 )
 from saltus.codegen.kernels import Kernels
@@ -35,8 +36,8 @@ from saltus.language.expression import walk
 from saltus.system import System
 from saltus.system.quantity import acting_guards
 
-#: Modes that a step of the modal flow holds in a lane each.
-MODAL_LANES = templates.BITCODE["modal"][1]
+#: Modes that a step of the modal flow holds in a lane each, and waves that their search does.
+MODAL_LANES, WAVE_LANES = (templates.BITCODE[name][1] for name in ("modal", "waves"))
 #: Text above the templates when they run as plain Python.
 _PREAMBLE = """
 import math
@@ -158,6 +159,12 @@ def modal_module() -> Any:
     """The compiled modal flow, the same for all systems."""
     head = Head({"LANES": MODAL_LANES}, "")
     return _flow(MODAL, "modal", head, "modal", "the modal flow")
+
+
+@lru_cache(maxsize=1)
+def waves_module() -> Any:
+    """The compiled search for the turning points of sums of waves, the same for all systems."""
+    return _flow(WAVES, "waves", Head({"LANES": WAVE_LANES}, ""), "waves", "turns of waves")
 
 
 def _described(system: System) -> str:

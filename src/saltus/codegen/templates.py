@@ -24,6 +24,7 @@ from saltus.codegen.interface import (
     NDF,
     PAIR,
     TAYLOR,
+    WAVES,
     Interface,
 )
 from saltus.errors import CacheError
@@ -35,6 +36,7 @@ BITCODE: dict[str, tuple[Interface, int]] = {
     **{f"taylor_{lanes}": (TAYLOR, lanes) for lanes in WIDTHS}, "pair": (PAIR, 1),
     "fixed_step": (FIXED_STEP, 1), "adams": (ADAMS, 1), "ndf": (NDF, 1), "capture": (CAPTURE, 1),
     "harmonics": (HARMONICS, 1), "balance": (BALANCE, 1), "modal": (MODAL, 4),
+    "waves": (WAVES, 4),
 }  # fmt: skip
 #: Kernels that the templates import.
 _SHARED = ("lanes", "trigonometry", "isolation", "status", "batch", "parts", "clocks_layout")

@@ -14,7 +14,7 @@ def listed(folder):
     return [name for row in rows.splitlines() for name in row[:16].replace(",", " ").split()]
 
 
-@pytest.mark.parametrize("folder", ["taylor", "modal", "stepping", "harmonics"])
+@pytest.mark.parametrize("folder", ["taylor", "modal", "stepping", "harmonics", "waves"])
 def test_a_folder_lists_its_templates_in_their_order(folder):
     names = listed(folder)
     package = Path(import_module(f"saltus.kernels.{folder}").__file__).parent

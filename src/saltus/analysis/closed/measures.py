@@ -25,8 +25,8 @@ from saltus.flow.motion_series import Pieces
 from saltus.flow.pieces import nodes_of, pieces
 from saltus.flow.request import Outcome
 from saltus.flow.threads import on_threads
-from saltus.flow.waves import WaveLegs, deviations, extremes, harmonics, least_turns, means, turns
-from saltus.interrupt import check_stop
+from saltus.flow.wave_turns import extremes, least_turns, turns
+from saltus.flow.waves import WaveLegs, deviations, harmonics, means
 from saltus.kernels import status as st
 from saltus.system import margin_gaps
 
@@ -41,8 +41,6 @@ TOGETHER = 8
 PLACES = 21
 #: Turning points closer than this are one [forcing periods].
 SAME = 1e-9
-#: A gap that turns within this share of its range is looked for first.
-NEAR = 1e-3
 #: A gap that closes at more than this share of its largest rate is struck, not grazed.
 STRUCK = 1e-6
 
@@ -249,7 +247,6 @@ def _measured_by_waves(
         return result
     legs = WaveLegs.joined([one for one in motions if one is not None])
     gaps = outputs + np.array(margin_gaps(map_.system)[0], np.int64)
-    check_stop()
     low, high = extremes(legs)
     result.maximum[known], result.minimum[known] = high[:, :outputs], low[:, :outputs]
     wanted = replace(legs, rows=legs.rows[:, :outputs])
@@ -258,10 +255,8 @@ def _measured_by_waves(
     if map_.system.forced_at is not None:
         period = np.broadcast_to(map_.period, len(motions))[known]
         result.harmonic[known] = harmonics(wanted, 2.0 * np.pi / period)
-    check_stop()
-    spans = (high - low)[:, gaps]
-    result.margin[known] = least_turns(legs, gaps, NEAR * spans).min(axis=1, initial=np.inf)
-    result.span[known] = spans.max(axis=1, initial=0.0)
+    result.margin[known] = least_turns(legs, gaps)
+    result.span[known] = (high - low)[:, gaps].max(axis=1, initial=0.0)
     for i, states in zip(known, _turning_states(legs, size, closed), strict=True):
         result.turning[i] = states
     return result

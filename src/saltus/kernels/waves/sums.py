@@ -1,0 +1,76 @@
+"""Template: waves on a leg, computed once for all quantities; what they add up to, and bounds."""
+
+from saltus.kernels.lanes import fma, load, magnitude, select, splat, store
+from saltus.kernels.trigonometry import sincos
+
+
+@kernel
+def move_to(leg, time, rates, amplitudes, state, work, groups):
+    """The waves of a leg at a time since it began."""
+    rate, at = 3 * groups * state[leg], 3 * groups * leg
+    for g in range(groups):
+        decay = exponential(load(rates, rate + g, LANES) * time)
+        sine, cosine = sincos(load(rates, rate + groups + g, LANES) * time)
+        a, b = load(amplitudes, at + g, LANES), load(amplitudes, at + groups + g, LANES)
+        store(work, NOW * groups + g, decay * fma(a, cosine, -(b * sine)))
+        store(work, (NOW + 1) * groups + g, decay * fma(a, sine, b * cosine))
+
+
+@kernel
+def bound_waves(leg, middle, half, rates, amplitudes, state, work, groups):
+    """The waves of a leg that are slow in a part of it, with three derivatives, where it has its
+    middle; and what is left out.
+    """
+    rate, at = 3 * groups * state[leg], 3 * groups * leg
+    for g in range(groups):
+        grows, turns = load(rates, rate + g, LANES), load(rates, rate + groups + g, LANES)
+        speed = load(rates, rate + 2 * groups + g, LANES)
+        most = exponential(fma(grows, middle, magnitude(grows) * half))
+        size = load(amplitudes, at + 2 * groups + g, LANES) * most
+        reach, nothing = speed * half, splat(0.0, LANES)
+        slow = reach < splat(1.0, LANES)
+        real = select(slow, load(work, NOW * groups + g, LANES), nothing)
+        imaginary = select(slow, load(work, (NOW + 1) * groups + g, LANES), nothing)
+        for order in range(4):
+            store(work, (SLOW + 2 * order) * groups + g, real)
+            store(work, (SLOW + 2 * order + 1) * groups + g, imaginary)
+            real, imaginary = (
+                fma(grows, real, -(turns * imaginary)),
+                fma(grows, imaginary, turns * real),
+            )
+        store(work, STEEP * groups + g, size * speed)
+        one, square = splat(1.0, LANES), reach * reach
+        left = square * square * (1.0 / 24.0)
+        store(work, REST * groups + g, size * select(slow, left, one))
+        left, size = square * reach * (1.0 / 6.0), size * speed
+        store(work, (REST + 1) * groups + g, size * select(slow, left, one))
+        left, size = 0.5 * square, size * speed
+        store(work, (REST + 2) * groups + g, size * select(slow, left, one))
+
+
+@inner
+def seen(row, waves, quantities, work, groups, sums):
+    """The real part of a sum of waves, whose real parts stand from a row of `work` on."""
+    total = splat(0.0, LANES)
+    for g in range(groups):
+        total = fma(load(quantities, row + g, LANES), load(work, waves + g, LANES), total)
+        b = load(quantities, row + groups + g, LANES)
+        total = fma(-b, load(work, waves + groups + g, LANES), total)
+    return sum_of(total, sums)
+
+
+@inner
+def bounded(row, sizes, quantities, work, groups, sums):
+    """The sum of the sizes of waves, which stand from a row of `work` on, times a quantity's."""
+    total = splat(0.0, LANES)
+    for g in range(groups):
+        size = load(quantities, row + 2 * groups + g, LANES)
+        total = fma(size, load(work, sizes + g, LANES), total)
+    return sum_of(total, sums)
+
+
+@inner
+def sum_of(lane, sums):
+    """The sum of the numbers in a lane."""
+    store(sums, 0, lane)
+    return (sums[0, 0] + sums[0, 1]) + (sums[0, 2] + sums[0, 3])
