@@ -19,7 +19,7 @@ from scipy.optimize import elementwise
 from saltus.analysis.branches.arclength import correct, tangents
 from saltus.analysis.branches.equations import OrbitEquations
 from saltus.analysis.branches.events import Event
-from saltus.analysis.solve.linear import solved
+from saltus.analysis.solve.linear import solutions, solved
 from saltus.analysis.solve.newton import newton
 from saltus.flow.polynomials import between
 
@@ -312,35 +312,38 @@ def _branch_point(
 ) -> Event | None:
     """The point near another at which two branches cross; None if none is found.
 
-    There the derivative J has a left null vector u, and Newton's method on F alone fails; on
-    ``F + b u = 0, J'u = 0, u'u = 1`` it doesn't. Kuznetsov, section 10.5.2.
+    There the null vectors of the derivative J span a plane, and Newton's method on F alone fails;
+    on ``F + b w = 0, g = 0`` it doesn't: w is the left null vector at the start, and g the two
+    numbers with ``J v + g w = 0`` for the vectors v that span the plane, as they are given by those
+    that do at the start. As for :func:`_folds`, J a short way along both is all that is needed
+    besides. Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria (2000), section
+    4.1; Kuznetsov, section 10.5.2.
     """
     unit, one = orbits.scale[row], np.array([row])
     size = len(start)
     _, derivative = orbits.evaluate(start[None], one)
     if not np.isfinite(derivative).all():
         return None
-    sides = np.concatenate([np.zeros((1, size)), ASIDE * np.eye(size), -ASIDE * np.eye(size)])
+    left, _, right = np.linalg.svd(derivative[0])
+    border = np.zeros((size + 1, size + 1))
+    border[: size - 1, size], border[size - 1 :, :size] = left[:, -1], right[-2:]
 
     def equations(x: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        z, b, null = np.split(x[0], [size, size + 1])
-        ends, matrices = orbits.evaluate(z + sides * unit, np.full(2 * size + 1, row))
-        jacobian = matrices[0]
-        bends = np.einsum("jmi,m->ij", matrices[1 : size + 1] - matrices[size + 1 :], null)
-        whole = np.zeros((2 * size, 2 * size))
-        whole[: size - 1, :size], whole[: size - 1, size] = jacobian, null
-        whole[: size - 1, size + 1 :] = b * np.eye(size - 1)
-        whole[size - 1 : -1, :size] = bends / (2 * ASIDE)
-        whole[size - 1 : -1, size + 1 :] = jacobian.T
-        whole[-1, size + 1 :] = 2 * null
-        residual = np.concatenate([ends[0] + b * null, jacobian.T @ null, [null @ null - 1.0]])
-        return residual[None], whole[None]
+        z, b, whole, last = x[0, :size], x[0, size], border.copy(), np.eye(size + 1)[:, -2:]
+        ends, matrices = orbits.evaluate(z[None], one)
+        whole[: size - 1, :size] = matrices[0]
+        plane, adjoint = (solutions(each[None], last[None])[0] for each in (whole, whole.T))
+        along_both = z + ASIDE * plane[:size].T * unit
+        beside = orbits.evaluate(along_both, np.repeat(one, 2))[1] - matrices
+        rows_of_all = border.copy()
+        rows_of_all[: size - 1, :size] = matrices[0]
+        rows_of_all[size - 1 :, :size] = -adjoint[: size - 1, -1] @ beside / ASIDE
+        return np.concatenate([ends[0] + b * left[:, -1], plane[size]])[None], rows_of_all[None]
 
-    null = np.linalg.svd(derivative[0])[0][:, -1]
     zeros = newton(
         equations,
-        np.concatenate([start, [0.0], null])[None],
-        np.concatenate([unit, np.ones(size)])[None],
+        np.append(start, 0.0)[None],
+        np.append(unit, 1.0)[None],
         enough=CONVERGED,
         longest_step=np.inf,
     )

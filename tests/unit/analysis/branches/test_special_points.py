@@ -93,3 +93,43 @@ def test_a_branch_point_is_looked_for_from_nearer_where_newtons_method_fails(
     (event,) = special_points.locate(curves, np.zeros(1, int), z, tangent, number, values)
     np.testing.assert_allclose(event.z, [0.0, 0.0123], atol=1e-13)
     assert len(guesses) == tries
+
+
+class MixedCrossings:
+    """n equations A g(B z) = 0 whose first factor vanishes on two branches, which cross at a point
+    that isn't a start: g_1 = y_1 (y_n - 0.02 - y_1 + y_1 y_2), g_i = y_i (2 + sin y_n) + y_1 y_i.
+    """
+
+    def __init__(self, random, n):
+        self.left, self.right = random.normal(size=(n, n)), random.normal(size=(n + 1, n + 1))
+        self.scale, self.evaluated = random.uniform(0.5, 2.0, (1, n + 1)), 0
+        self.crossing = np.linalg.solve(self.right, np.append(np.zeros(n), 0.02))
+
+    def evaluate(self, z, rows):
+        self.evaluated += len(z)
+        found, by = [], []
+        for y in z @ self.right.T:
+            first, second, last, n = y[0], y[1], y[-1], len(self.left)
+            g, slopes = y[:-1] * (2.0 + np.sin(last) + first), np.zeros((n, n + 1))
+            slopes[:, :n] = (2.0 + np.sin(last) + first) * np.eye(n)
+            slopes[:, 0] += y[:-1]
+            slopes[:, -1] = y[:-1] * np.cos(last)
+            g[0] = first * (last - 0.02 - first + first * second)
+            slopes[0] = 0.0
+            slopes[0, [0, 1, -1]] = last - 0.02 - 2 * first * (1 - second), first**2, first
+            found.append(self.left @ g)
+            by.append(self.left @ slopes @ self.right * self.scale)
+        return np.array(found), np.array(by)
+
+    def multipliers(self, z, derivative, rows):
+        return np.zeros((len(z), 1), complex)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_branch_point_takes_few_evaluations_however_many_the_unknowns(seed):
+    random = np.random.default_rng(seed)
+    curves = MixedCrossings(random, 30)
+    start = curves.crossing + 1e-3 * random.normal(size=31) * curves.scale[0]
+    event = special_points._branch_point(curves, 0, start, random.normal(size=31))
+    np.testing.assert_allclose(event.z, curves.crossing, atol=1e-11)
+    assert curves.evaluated < 31
