@@ -49,7 +49,7 @@ LONGEST = 0.12
 SHORTEST = 1e-7
 #: Distance from where a curve began at which steps may be longer than the longest, in units of the
 #: scale.
-FAR = 10.0
+FAR = 3.0
 #: Least share of a tangent.
 TINY = 1e-3
 #: Distance from where a curve ends within which its last point lies, in units of the scale.
