@@ -4,6 +4,7 @@ samples.
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -251,3 +252,46 @@ def test_numbers_of_a_motion_dont_depend_on_those_beside_it():
     whole = WaveLegs.joined([first, one, last])
     for together, alone in zip(numbers(whole), numbers(one), strict=True):
         np.testing.assert_array_equal(together[1], alone[0])
+
+
+def of_every_speed(rng):
+    """WaveLegs of up to 45 waves over four decades of rates, some of which don't oscillate."""
+    waves, top, legs = int(rng.integers(1, 45)), rng.uniform(0.5, 4.0), int(rng.integers(1, 4))
+    omega, ratio = 10 ** rng.uniform(-1, top, waves), 10 ** rng.uniform(-4, 0.5, waves)
+    turning = np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
+    rates = np.append(omega * (1j * turning - ratio * (rng.random(waves) > 0.2)), 0.0)
+    rows, amplitudes = (
+        rng.normal(size=(count, waves + 1)) + 1j * rng.normal(size=(count, waves + 1))
+        for count in (3, legs)
+    )
+    amplitudes /= np.maximum(np.abs(rates), 1.0) ** rng.uniform(0.0, 1.5)
+    amplitudes[:, -1], rows[:, -1] = 1.0, rows[:, -1].real
+    length = rng.uniform(0.01, 1.0, legs) * min(1.0, 300.0 / 10**top) * rng.choice([1, 10])
+    return one_state(rates, rows, amplitudes, np.cumsum(length) - length, length)
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [*range(4), pytest.param(time.time_ns() % 2**32, marks=pytest.mark.nightly, id="clock")],
+)
+def test_no_turn_and_no_extreme_of_waves_of_every_speed_is_missed(seed):
+    """Beside dense samples; each turn found is one."""
+    rng = np.random.default_rng(seed)
+    for _ in range(2 if seed < 4 else 100):
+        one = of_every_speed(rng)
+        leg, row, when = turns(one, np.arange(3))
+        low, high = extremes(one)[:, 0]
+        size = (np.abs(one.amplitudes).max(axis=0) * np.abs(one.rows[0])).sum(axis=1)
+        steep = np.abs(one.amplitudes * one.rates).max(axis=0) @ np.abs(one.rows[0]).T
+        moving = replace(one, rows=one.rows * one.rates[:, None])
+        slopes = moving.values(leg, when)[np.arange(len(row)), row]
+        assert (np.abs(slopes) < 1e-11 * steep[row]).all()
+        for i, length in enumerate(one.length):
+            shares = np.append(np.linspace(0.0, 1.0, 30_001), np.geomspace(1e-9, 1.0, 2000))
+            at = one.values(np.full(len(shares), i), length * np.sort(shares))
+            assert (low <= at.min(axis=0) + 1e-13 * size).all(), seed
+            assert (high >= at.max(axis=0) - 1e-13 * size).all(), seed
+            for r, steps in enumerate(np.diff(at, axis=0).T):
+                ways = np.sign(steps[np.abs(steps) > 1e-13 * size[r]])
+                seen = (ways[1:] != ways[:-1]).sum()
+                assert ((leg == i) & (row == r)).sum() >= seen, seed

@@ -114,7 +114,7 @@ class ModalFlow:
         answer: int = self._kernel.propagate(*batch, budget, *tables, *self._work())
         ended = np.flatnonzero(running & np.isin(batch.status, ENDED))
         sets = batch.carry[ended, layout.SET].astype(int)
-        for which in np.unique(sets).tolist():
+        for which in np.unique(sets).tolist() if len(self.tables.partners) else ():
             self._keep_sides(batch, ended[sets == which])
         return answer
 
@@ -145,12 +145,13 @@ class ModalFlow:
             for g in [-1, *np.flatnonzero(rests[rows[0]] & (tables.allowed != 0)).tolist()]:
                 self._rest(given, free, shown, g, held[rows, g], state, rows, time[rows])
         batch.state[who, : self._states] = state
-        gap, _ = self._values(given.gaps, given, state, drives)
-        for i, g in np.argwhere(gap * tables.limits > 0).tolist():  # a memory isn't beyond
+        gap, noise = self._values(given.gaps, given, state, drives)
+        for i, g in (beyond := np.argwhere(gap * tables.limits > 0).tolist()):  # a memory isn't
             row = given.gaps.matrix[g]
             j = int(np.argmax(np.abs(row)))
             batch.state[who[i], j] = state[i, j] = state[i, j] - gap[i, g] / row[j]
-        gap, noise = self._values(given.gaps, given, state, drives)
+        if beyond:
+            gap, noise = self._values(given.gaps, given, state, drives)
         free = (tables.plain | (tables.allowed != 0)) & ~(stays | held)
         side, met = np.where((mode >> guards) & 1, 1.0, -1.0), (fresh >> guards) & (gap == 0.0) != 0
         least = np.where(tables.rubs, 2 * noise, noise / 4)  # what slides isn't taken to stick
