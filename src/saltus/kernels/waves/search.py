@@ -70,7 +70,6 @@ def turn_once(leg, row, low, high, rates, amplitudes, state, quantities, work, s
         inside = low <= time <= high
         if not inside:
             time = 0.5 * (low + high)
-        value += slope * (time - now) + 0.5 * bend * (time - now) * (time - now)
         enough = near if inside else 0.0
         if abs(time - now) <= max(SETTLED * (abs(now) + high - low), enough):
             break
