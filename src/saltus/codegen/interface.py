@@ -269,7 +269,7 @@ MODAL = Interface(
     truths=(),
 )
 
-#: Where sums of waves turn, which doesn't depend on an equation.
+#: The turning points of sums of waves, which don't depend on an equation.
 WAVES = Interface(
     entry="search",
     arguments=(_I1, _F2, _F2, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2, _I1),

@@ -1,5 +1,5 @@
-"""Where sums of waves turn (flow/waves.py), and their smallest and largest values: by the compiled
-search of kernels/waves, motion by motion.
+"""Turning points of sums of waves (flow/waves.py), and their smallest and largest values: by the
+compiled search of kernels/waves, motion by motion.
 """
 
 from __future__ import annotations

@@ -2,5 +2,6 @@
 and raise nothing.
 
 A folder holds the templates of a kind of flow: ``taylor``, ``modal``, ``stepping`` (all other
-methods). What several flows share stands beside the folders.
+methods). ``harmonics`` and ``waves`` move nothing: equations of harmonic balance, and turning
+points of sums of waves. What several of them share stands beside the folders.
 """
