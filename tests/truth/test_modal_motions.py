@@ -291,8 +291,11 @@ def test_rates_by_modes_are_those_of_the_equations():
     np.testing.assert_allclose(modal_rates(map_, start), rates, rtol=0, atol=1e-12 * rates.max())
 
 
-def test_a_structure_without_contacts_has_the_response_of_its_matrices():
-    """Twelve modes of a chain: |(K - w^2 M + i w C)^-1 f|."""
+@pytest.mark.parametrize(
+    "highest", ["6 Hz", pytest.param("25 Hz", marks=pytest.mark.slow, id="ten resonances")]
+)
+def test_a_structure_without_contacts_has_the_response_of_its_matrices(highest):
+    """Twelve modes of a chain: |(K - w^2 M + i w C)^-1 f|, and one branch over all resonances."""
     n = 12
     mass, stiff = np.eye(n), 1e4 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
     damp, names = 2e-4 * stiff, [f"u{i}" for i in range(n)]
@@ -300,7 +303,7 @@ def test_a_structure_without_contacts_has_the_response_of_its_matrices():
         mass, stiff, damp, names=names, modes=n, forces=[sl.Force("u3", "2 N")],
         frequency="5 Hz", sensors={"end": "u11"},
     )  # fmt: skip
-    found = sl.frequency_response(chain, ("5 Hz", "25 Hz", 3), progress=False)
+    found = sl.frequency_response(chain, ("5 Hz", highest, 3), progress=False)
     rates = 2 * np.pi * found.frequency.values
     wanted = [
         np.abs(np.linalg.solve(stiff - w**2 * mass + 1j * w * damp, 2.0 * np.eye(n)[3])[11])
@@ -310,6 +313,7 @@ def test_a_structure_without_contacts_has_the_response_of_its_matrices():
     peak = found.output_maximum.sel(output="end").values[rows]
     np.testing.assert_allclose(peak, wanted, rtol=1e-9)
     assert np.isinf(found.response_margin.values).all()
+    assert (found.branch_begin.item(), found.branch_end.item()) == ("range", "range")
 
 
 def random_chain(seed):

@@ -112,7 +112,7 @@ class Tables:
         self.made: list[tuple[StateEquations, StateModes]] = []
         self._by: dict[tuple[str, ...], ParameterTables] = {}
         drives, gaps = max(len(self.linear.drives), 1), len(self._laws)
-        self._offset, self._rate, self._lag = Rows(max(gaps, 1)), Rows(drives), Rows(drives)
+        self._offset, self._rate, self._lag = Rows(max(2 * gaps, 1)), Rows(drives), Rows(drives)
         self._links = Links(layout.BEHIND + gaps)
         self._course = Rows(max(5 * len(self.linear.courses), 1))
         states = len(self.linear.states)
@@ -186,7 +186,8 @@ class Tables:
             if self.holds.any():
                 gaps = replace(gaps, constant=np.where(self.holds, 0.0, gaps.constant))
             for table, numbers in (
-                (self._offset, gaps.constant), (self._rate, rates), (self._lag, lags),
+                (self._offset, np.append(gaps.constant, self._levels(gaps))),
+                (self._rate, rates), (self._lag, lags),
                 (self._course, rows),
             ):  # fmt: skip
                 table.add(np.append(numbers, np.zeros(table.table.shape[1] - len(numbers))))
@@ -208,6 +209,12 @@ class Tables:
             self._sets[key] = len(self.sets) - 1
             self._held += SET_BYTES + self.sets[-1].gaps.matrix.nbytes
         return self._sets[key]
+
+    def _levels(self, gaps: LinearPiece) -> np.ndarray:
+        """Where each boundary is that is a level of a state, float64[gaps]; 0 of the others."""
+        state, every = self._laws[:, layout.LEVEL], np.arange(len(self._laws))
+        slope = np.where(state >= 0, gaps.matrix[every, state], 1.0)
+        return np.where(state >= 0, -gaps.constant / slope, 0.0)
 
     def _course_of(self, node: Expr, values: dict[str, float]) -> tuple[Course, list[float]]:
         """A course and its row of numbers for the kernel: one for all values that it doesn't ask

@@ -171,9 +171,10 @@ def push(i, g, change, batch, m):
 @inner
 def snap(i, g, batch, m):
     """Put the state on the boundary of a guard, if that is a level of a state."""
-    j, row = m.laws[g, LEVEL], law_row(i, g, batch, m)
+    j = m.laws[g, LEVEL]
     if j >= 0:
-        m.state[j // LANES, j % LANES] = -m.acts[row, m.sizes[STATES]] / m.acts[row, j]
+        level = m.offset[int(batch.carry[i, SET]), m.sizes[GUARDS] + g]
+        m.state[j // LANES, j % LANES] = level
 
 
 # -- landing on a contact with a law ---------------------------------------------------------------

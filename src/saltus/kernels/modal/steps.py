@@ -244,6 +244,9 @@ def land(i, tau, d, hits, modes, steady, batch, m):
         batch.sample_mode[i, k] = before ^ hits
     for g in range(m.sizes[GUARDS]):
         if not starts and (hits >> g) & 1:
+            snap(i, g, batch, m)
+    for g in range(m.sizes[GUARDS]):
+        if not starts and (hits >> g) & 1:
             _, rate = gap_of_moved(m.row_of[g], modes, steady, which, m)
             rate *= m.sign_of[g]
             size = m.errors[m.row_of[g], 2] + abs(m.offset[which, g])
