@@ -163,6 +163,18 @@ def test_turning_points_of_a_motion_are_all_there_however_many():
     np.testing.assert_allclose(np.sort(when), np.arange(1, 287) * np.pi / 900, atol=1e-13)
 
 
+@pytest.mark.nojit
+def test_a_turn_where_a_leg_is_halved_is_found_once():
+    """e^{-t} - e^{-2t}, whose slope is 0 to the bit at ln 2, halfway."""
+    one = one_state(
+        np.array([-1.0, -2.0], complex), np.array([[1.0, -1.0]], complex),
+        np.ones((1, 2), complex), np.zeros(1), np.array([2 * np.log(2.0)]),
+    )  # fmt: skip
+    *_, when = turns(one, np.array([0]))
+    assert when.tolist() == [np.log(2.0)]
+    assert least_turns(one, np.array([0])) == [0.25]
+
+
 def test_a_gap_that_touches_its_boundary_has_a_least_turn_of_rounding():
     """1 + cos(t) at pi, among gaps that come less near."""
     one = one_state(

@@ -49,14 +49,17 @@ def slope_and_bend(
 @kernel
 def turn_once(leg, row, low, high, rates, amplitudes, state, quantities, work, sums, groups):
     """Time and value where a quantity turns in a part of a leg that holds one turn or none: by
-    Newton's method inside a shrinking bracket. The time is NaN if there is none.
+    Newton's method inside a shrinking bracket. The time is NaN if there is none. A turn between two
+    parts is one of the first.
     """
     here = (rates, amplitudes, state, quantities, work, sums, groups)
     _, first, _ = slope_and_bend(leg, row, low, *here)
-    _, last, _ = slope_and_bend(leg, row, high, *here)
+    value, last, _ = slope_and_bend(leg, row, high, *here)
+    if last == 0.0 and first != 0.0:
+        return high, value
     if not first * last < 0.0:
         return math.nan, math.nan
-    near, time, value = LAST * (high - low), 0.5 * (low + high), 0.0
+    near, time = LAST * (high - low), 0.5 * (low + high)
     for _ in range(MOST_STEPS):
         now = time
         value, slope, bend = slope_and_bend(leg, row, now, *here)
