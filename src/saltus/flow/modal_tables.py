@@ -211,7 +211,7 @@ class Tables:
         return self._sets[key]
 
     def _levels(self, gaps: LinearPiece) -> np.ndarray:
-        """Where each boundary is that is a level of a state, float64[gaps]; 0 of the others."""
+        """Levels of the boundaries that are those of a state, float64[gaps]; 0 of the others."""
         state, every = self._laws[:, layout.LEVEL], np.arange(len(self._laws))
         slope = np.where(state >= 0, gaps.matrix[every, state], 1.0)
         return np.where(state >= 0, -gaps.constant / slope, 0.0)
