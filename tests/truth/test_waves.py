@@ -163,6 +163,15 @@ def test_turning_points_of_a_motion_are_all_there_however_many():
     np.testing.assert_allclose(np.sort(when), np.arange(1, 287) * np.pi / 900, atol=1e-13)
 
 
+@pytest.mark.parametrize("share", [1e-6, 1e-12])
+def test_waves_that_cancel_but_for_a_share_turn_as_that_does(share):
+    rates, rows = np.array([0.0, 1000j, 1000j]), np.array([[0.0, 1.0 + share, -1.0]], complex)
+    one = one_state(rates, rows, np.ones((1, 3), complex), np.zeros(1), np.full(1, 0.1))
+    *_, when = turns(one, np.array([0]))
+    np.testing.assert_allclose(np.sort(when), np.arange(1, 32) * np.pi / 1000, atol=2e-7)
+    np.testing.assert_allclose(extremes(one).ravel(), [-share, share], atol=1e-15)
+
+
 @pytest.mark.nojit
 def test_a_turn_where_a_leg_is_halved_is_found_once():
     """e^{-t} - e^{-2t}, whose slope is 0 to the bit at ln 2, halfway."""

@@ -13,14 +13,14 @@ GOAL, GROUPS, QUANTITIES, FIRST, BEHIND = range(5)
 EXTREMES, LEAST, TURNS = range(3)
 #: Most halvings of a leg: a part that is smaller is rounding.
 DEEPEST = 47
-#: A part is small enough if what it leaves out of a slope, relative to the sizes of its waves, is
+#: A part is small enough if what it leaves out of a bend, relative to the sizes of its waves, is
 #: less: where it isn't decided then, waves cancel, and the quantity turns once at most that counts.
-NARROW = 1e-10
-#: Rounding of a sum of waves, relative to their sizes: a slope below it is none.
+NARROW = 1e-7
+#: Rounding of a sum of waves, relative to their sizes: what has no bend beyond it doesn't turn.
 ROUNDED = 1e-15
 #: A step of Newton's method that is rounding, relative to the time; one that is the last, relative
 #: to a part in which a quantity turns once; and most of them.
 SETTLED, LAST, MOST_STEPS = 4e-16, 1e-8, 60
 #: Rows of `work` over G: the waves, real and imaginary; those that are slow in a part, and three
-#: derivatives; what these leave out of a quantity, of its slope and its bend; sizes of the slopes.
-NOW, SLOW, REST, STEEP, WORK = 0, 2, 10, 13, 14
+#: derivatives; what these leave out of a quantity, of its slope and its bend; sizes of the bends.
+NOW, SLOW, REST, SHARP, WORK = 0, 2, 10, 13, 14

@@ -98,12 +98,13 @@ def is_undecided(
     left = bounded(row, (REST + 1) * groups, quantities, work, groups, sums)
     if not abs(slope) <= way + left:
         return 0
-    steep = bounded(row, STEEP * groups, quantities, work, groups, sums)
-    if left <= NARROW * steep:
-        return 0 if abs(slope) + way <= ROUNDED * steep else 1
-    room = abs(third) * half
-    room += bounded(row, (REST + 2) * groups, quantities, work, groups, sums)
-    return 1 if abs(bend) > room else 2
+    left = bounded(row, (REST + 2) * groups, quantities, work, groups, sums)
+    if abs(bend) > abs(third) * half + left:
+        return 1
+    sharp = bounded(row, SHARP * groups, quantities, work, groups, sums)
+    if left > NARROW * sharp:
+        return 2
+    return 1 if abs(bend) > ROUNDED * sharp else 0
 
 
 @kernel

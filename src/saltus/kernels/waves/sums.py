@@ -38,7 +38,7 @@ def bound_waves(leg, middle, half, rates, amplitudes, state, work, groups):
                 fma(grows, real, -(turns * imaginary)),
                 fma(grows, imaginary, turns * real),
             )
-        store(work, STEEP * groups + g, size * speed)
+        store(work, SHARP * groups + g, size * speed * speed)
         one, square = splat(1.0, LANES), reach * reach
         left = square * square * (1.0 / 24.0)
         store(work, REST * groups + g, size * select(slow, left, one))
