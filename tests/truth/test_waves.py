@@ -276,7 +276,9 @@ def test_numbers_of_a_motion_dont_depend_on_those_beside_it():
 
 
 def of_every_speed(rng):
-    """WaveLegs of up to 45 waves over four decades of rates, some of which don't oscillate."""
+    """WaveLegs of up to 46 waves over four decades of rates, some of which don't oscillate; in half
+    of them two waves cancel but for a share.
+    """
     waves, top, legs = int(rng.integers(1, 45)), rng.uniform(0.5, 4.0), int(rng.integers(1, 4))
     omega, ratio = 10 ** rng.uniform(-1, top, waves), 10 ** rng.uniform(-4, 0.5, waves)
     turning = np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
@@ -287,6 +289,10 @@ def of_every_speed(rng):
     )
     amplitudes /= np.maximum(np.abs(rates), 1.0) ** rng.uniform(0.0, 1.5)
     amplitudes[:, -1], rows[:, -1] = 1.0, rows[:, -1].real
+    if rng.random() < 0.5:
+        twin, share = rng.integers(waves), 10 ** rng.uniform(-14.0, 0.0)
+        rates, amplitudes = (np.insert(one, 0, one[..., twin], -1) for one in (rates, amplitudes))
+        rows = np.insert(rows, 0, (share - 1.0) * rows[:, twin], 1)
     length = rng.uniform(0.01, 1.0, legs) * min(1.0, 300.0 / 10**top) * rng.choice([1, 10])
     return one_state(rates, rows, amplitudes, np.cumsum(length) - length, length)
 

@@ -6,6 +6,8 @@ imaginary ones, G of their sizes; a leg the same of its amplitudes, a quantity t
 contact state.
 """
 
+from collections import namedtuple
+
 #: Places of `sizes`: what is looked for, G, quantities, first leg, and the one behind the last.
 GOAL, GROUPS, QUANTITIES, FIRST, BEHIND = range(5)
 #: Goals: smallest and largest values of all quantities, to `limits`; the smallest magnitude that
@@ -24,3 +26,7 @@ SETTLED, LAST, MOST_STEPS = 4e-16, 1e-8, 60
 #: Rows of `work` over G: the waves, real and imaginary; those that are slow in a part, and three
 #: derivatives; what these leave out of a quantity, of its slope and its bend; sizes of the bends.
 NOW, SLOW, REST, SHARP, WORK = 0, 2, 10, 13, 14
+
+Waves = namedtuple(
+    "Waves", "sizes rates amplitudes state length quantities limits turning work sums opened many"
+)

@@ -28,33 +28,31 @@ def is_wanted(goal, r, value, room, limits):
 
 
 @kernel
-def slope_and_bend(
-    leg, row, time, rates, amplitudes, state, quantities, work, sums, groups
-):  # fmt: skip
+def slope_and_bend(leg, row, time, w):
     """A quantity, its slope and its bend at a time of a leg."""
-    move_to(leg, time, rates, amplitudes, state, work, groups)
-    rate = 3 * groups * state[leg]
+    move_to(leg, time, w)
+    groups, work = w.sizes[GROUPS], w.work
+    rate = 3 * groups * w.state[leg]
     value, slope, bend = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
     for g in range(groups):
-        grows, turns = load(rates, rate + g, LANES), load(rates, rate + groups + g, LANES)
-        a, b = load(quantities, row + g, LANES), load(quantities, row + groups + g, LANES)
+        grows, turns = load(w.rates, rate + g, LANES), load(w.rates, rate + groups + g, LANES)
+        a, b = load(w.quantities, row + g, LANES), load(w.quantities, row + groups + g, LANES)
         x, y = load(work, NOW * groups + g, LANES), load(work, (NOW + 1) * groups + g, LANES)
         x, y = fma(a, x, -(b * y)), fma(a, y, b * x)
         value = value + x
         x, y = fma(grows, x, -(turns * y)), fma(grows, y, turns * x)
         slope, bend = slope + x, bend + fma(grows, x, -(turns * y))
-    return sum_of(value, sums), sum_of(slope, sums), sum_of(bend, sums)
+    return sum_of(value, w.sums), sum_of(slope, w.sums), sum_of(bend, w.sums)
 
 
 @kernel
-def turn_once(leg, row, low, high, rates, amplitudes, state, quantities, work, sums, groups):
+def turn_once(leg, row, low, high, w):
     """Time and value where a quantity turns in a part of a leg that holds one turn or none: by
     Newton's method inside a shrinking bracket. The time is NaN if there is none. A turn between two
     parts is one of the first.
     """
-    here = (rates, amplitudes, state, quantities, work, sums, groups)
-    _, first, _ = slope_and_bend(leg, row, low, *here)
-    value, last, _ = slope_and_bend(leg, row, high, *here)
+    _, first, _ = slope_and_bend(leg, row, low, w)
+    value, last, _ = slope_and_bend(leg, row, high, w)
     if last == 0.0 and first != 0.0:
         return high, value
     if not first * last < 0.0:
@@ -62,7 +60,7 @@ def turn_once(leg, row, low, high, rates, amplitudes, state, quantities, work, s
     near, time = LAST * (high - low), 0.5 * (low + high)
     for _ in range(MOST_STEPS):
         now = time
-        value, slope, bend = slope_and_bend(leg, row, now, *here)
+        value, slope, bend = slope_and_bend(leg, row, now, w)
         if slope == 0.0:
             break
         if slope * first > 0.0:
@@ -80,61 +78,57 @@ def turn_once(leg, row, low, high, rates, amplitudes, state, quantities, work, s
 
 
 @inner
-def is_undecided(
-    goal, r, row, half, quantities, limits, work, sums, groups
-):  # fmt: skip
+def is_undecided(goal, r, row, half, w):
     """0 if a part can't hold what is looked for of a quantity, 1 if the quantity turns there once
     at most, 2 if that isn't known.
     """
-    value = seen(row, SLOW * groups, quantities, work, groups, sums)
-    slope = seen(row, (SLOW + 2) * groups, quantities, work, groups, sums)
-    bend = seen(row, (SLOW + 4) * groups, quantities, work, groups, sums)
-    third = seen(row, (SLOW + 6) * groups, quantities, work, groups, sums)
+    value = seen(row, SLOW, w)
+    slope = seen(row, SLOW + 2, w)
+    bend = seen(row, SLOW + 4, w)
+    third = seen(row, SLOW + 6, w)
     way = abs(bend) * half + 0.5 * abs(third) * half * half
     room = (abs(slope) + 0.5 * abs(bend) * half + abs(third) * half * half / 6.0) * half
-    room += bounded(row, REST * groups, quantities, work, groups, sums)
-    if not is_wanted(goal, r, value, room, limits):
+    room += bounded(row, REST, w)
+    if not is_wanted(goal, r, value, room, w.limits):
         return 0
-    left = bounded(row, (REST + 1) * groups, quantities, work, groups, sums)
+    left = bounded(row, REST + 1, w)
     if not abs(slope) <= way + left:
         return 0
-    left = bounded(row, (REST + 2) * groups, quantities, work, groups, sums)
+    left = bounded(row, REST + 2, w)
     if abs(bend) > abs(third) * half + left:
         return 1
-    sharp = bounded(row, SHARP * groups, quantities, work, groups, sums)
+    sharp = bounded(row, SHARP, w)
     if left > NARROW * sharp:
         return 2
     return 1 if abs(bend) > ROUNDED * sharp else 0
 
 
 @kernel
-def search_leg(
-    leg, goal, count, found, rates, amplitudes, state, length, quantities, limits, turning, work,
-    sums, opened, many, groups,
-):  # fmt: skip
+def search_leg(leg, goal, count, found, w):
     """Look through a leg, part by part. Returns how many turning points have been found."""
-    here = (rates, amplitudes, state, quantities, work, sums, groups)
-    first, depth, place, parts = 3 * groups * count * state[leg], 0, 0, 1.0
+    opened, many, turning = w.opened, w.many, w.turning
+    first = 3 * w.sizes[GROUPS] * count * w.state[leg]
+    depth, place, parts = 0, 0, 1.0
     for r in range(count):
         opened[0, r] = r
     many[0] = count
     while True:
-        half = 0.5 * length[leg] / parts
+        half = 0.5 * w.length[leg] / parts
         middle = (2 * place + 1) * half
-        move_to(leg, middle, rates, amplitudes, state, work, groups)
-        bound_waves(leg, middle, half, rates, amplitudes, state, work, groups)
+        move_to(leg, middle, w)
+        bound_waves(leg, middle, half, w)
         left = 0
         for k in range(many[depth]):
             r = opened[depth, k]
-            row = first + 3 * groups * r
-            answer = is_undecided(goal, r, row, half, quantities, limits, work, sums, groups)
+            row = first + 3 * w.sizes[GROUPS] * r
+            answer = is_undecided(goal, r, row, half, w)
             if answer == 2:
                 opened[depth + 1, left] = r
                 left += 1
             elif answer == 1:
-                time, value = turn_once(leg, row, middle - half, middle + half, *here)
+                time, value = turn_once(leg, row, middle - half, middle + half, w)
                 if not math.isnan(time):
-                    see(goal, r, value, limits)
+                    see(goal, r, value, w.limits)
                     if goal == TURNS and found < turning.shape[0]:
                         turning[found, 0], turning[found, 1], turning[found, 2] = leg, r, time
                     found += 1
@@ -160,17 +154,17 @@ def search(
     the leg began [s]; the rest to work with. Returns how many turning points were met: as many as
     there is room for stand in `turning`.
     """
+    w = Waves(
+        sizes, rates, amplitudes, state, length, quantities, limits, turning, work, sums, opened,
+        many,
+    )  # fmt: skip
     goal, groups, count, found = sizes[GOAL], sizes[GROUPS], sizes[QUANTITIES], 0
     for leg in range(sizes[FIRST], sizes[BEHIND] if goal == EXTREMES else sizes[FIRST]):
         first = 3 * groups * count * state[leg]
         for k in range(3):
-            move_to(leg, 0.5 * k * length[leg], rates, amplitudes, state, work, groups)
+            move_to(leg, 0.5 * k * length[leg], w)
             for r in range(count):
-                row = first + 3 * groups * r
-                see(goal, r, seen(row, NOW * groups, quantities, work, groups, sums), limits)
+                see(goal, r, seen(first + 3 * groups * r, NOW, w), limits)
     for leg in range(sizes[FIRST], sizes[BEHIND]):
-        found = search_leg(
-            leg, goal, count, found, rates, amplitudes, state, length, quantities, limits, turning,
-            work, sums, opened, many, groups,
-        )  # fmt: skip
+        found = search_leg(leg, goal, count, found, w)
     return found

@@ -5,28 +5,30 @@ from saltus.kernels.trigonometry import sincos
 
 
 @kernel
-def move_to(leg, time, rates, amplitudes, state, work, groups):
+def move_to(leg, time, w):
     """The waves of a leg at a time since it began."""
-    rate, at = 3 * groups * state[leg], 3 * groups * leg
+    groups, work = w.sizes[GROUPS], w.work
+    rate, at = 3 * groups * w.state[leg], 3 * groups * leg
     for g in range(groups):
-        decay = exponential(load(rates, rate + g, LANES) * time)
-        sine, cosine = sincos(load(rates, rate + groups + g, LANES) * time)
-        a, b = load(amplitudes, at + g, LANES), load(amplitudes, at + groups + g, LANES)
+        decay = exponential(load(w.rates, rate + g, LANES) * time)
+        sine, cosine = sincos(load(w.rates, rate + groups + g, LANES) * time)
+        a, b = load(w.amplitudes, at + g, LANES), load(w.amplitudes, at + groups + g, LANES)
         store(work, NOW * groups + g, decay * fma(a, cosine, -(b * sine)))
         store(work, (NOW + 1) * groups + g, decay * fma(a, sine, b * cosine))
 
 
 @kernel
-def bound_waves(leg, middle, half, rates, amplitudes, state, work, groups):
+def bound_waves(leg, middle, half, w):
     """The waves of a leg that are slow in a part of it, with three derivatives, where it has its
     middle; and what is left out.
     """
-    rate, at = 3 * groups * state[leg], 3 * groups * leg
+    groups, work = w.sizes[GROUPS], w.work
+    rate, at = 3 * groups * w.state[leg], 3 * groups * leg
     for g in range(groups):
-        grows, turns = load(rates, rate + g, LANES), load(rates, rate + groups + g, LANES)
-        speed = load(rates, rate + 2 * groups + g, LANES)
+        grows, turns = load(w.rates, rate + g, LANES), load(w.rates, rate + groups + g, LANES)
+        speed = load(w.rates, rate + 2 * groups + g, LANES)
         most = exponential(fma(grows, middle, magnitude(grows) * half))
-        size = load(amplitudes, at + 2 * groups + g, LANES) * most
+        size = load(w.amplitudes, at + 2 * groups + g, LANES) * most
         reach, nothing = speed * half, splat(0.0, LANES)
         slow = reach < splat(1.0, LANES)
         real = select(slow, load(work, NOW * groups + g, LANES), nothing)
@@ -49,24 +51,26 @@ def bound_waves(leg, middle, half, rates, amplitudes, state, work, groups):
 
 
 @inner
-def seen(row, waves, quantities, work, groups, sums):
-    """The real part of a sum of waves, whose real parts stand from a row of `work` on."""
+def seen(row, waves, w):
+    """The real part of a quantity's sum of waves, whose parts stand in these rows of `work`."""
+    groups, waves = w.sizes[GROUPS], waves * w.sizes[GROUPS]
     total = splat(0.0, LANES)
     for g in range(groups):
-        total = fma(load(quantities, row + g, LANES), load(work, waves + g, LANES), total)
-        b = load(quantities, row + groups + g, LANES)
-        total = fma(-b, load(work, waves + groups + g, LANES), total)
-    return sum_of(total, sums)
+        total = fma(load(w.quantities, row + g, LANES), load(w.work, waves + g, LANES), total)
+        b = load(w.quantities, row + groups + g, LANES)
+        total = fma(-b, load(w.work, waves + groups + g, LANES), total)
+    return sum_of(total, w.sums)
 
 
 @inner
-def bounded(row, sizes, quantities, work, groups, sums):
-    """The sum of the sizes of waves, which stand from a row of `work` on, times a quantity's."""
+def bounded(row, sizes, w):
+    """The sum of sizes of waves, which stand in these rows of `work`, times a quantity's."""
+    groups, sizes = w.sizes[GROUPS], sizes * w.sizes[GROUPS]
     total = splat(0.0, LANES)
     for g in range(groups):
-        size = load(quantities, row + 2 * groups + g, LANES)
-        total = fma(size, load(work, sizes + g, LANES), total)
-    return sum_of(total, sums)
+        size = load(w.quantities, row + 2 * groups + g, LANES)
+        total = fma(size, load(w.work, sizes + g, LANES), total)
+    return sum_of(total, w.sums)
 
 
 @inner
