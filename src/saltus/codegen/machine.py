@@ -17,7 +17,7 @@ from saltus.errors import CacheError, ParameterError, nearest, shown
 
 #: Version of the code made from the same templates and equations; it is part of the names of cache
 #: entries.
-PIPELINE = 5
+PIPELINE = 6
 #: LLVM's level for a template, for its passes if its sizes are open, and for an equation alone:
 #: straight lines of lanes, ready in a third of the time that level 1 takes (0085).
 LEVEL, LEVEL_OPEN, LEVEL_ALONE = 3, 1, 0
@@ -143,10 +143,22 @@ def _target_machine(made_for: Target, level: int = LEVEL) -> llvm.TargetMachine:
     else:
         llvm.initialize_all_targets()
         llvm.initialize_all_asmprinters()
-    found = llvm.Target.from_triple(made_for.triple)
-    return found.create_target_machine(
-        cpu=made_for.processor, features=made_for.features, opt=level, codemodel="jitdefault"
+    near = _in_one_block(made_for.triple)
+    return llvm.Target.from_triple(made_for.triple).create_target_machine(
+        cpu=made_for.processor,
+        features=made_for.features,
+        opt=level,
+        reloc="pic" if near else "default",
+        codemodel="small" if near else "jitdefault",
     )
+
+
+def _in_one_block(triple: str) -> bool:
+    """True where JITLink loads: it takes one block for code and the numbers that it reads, so that
+    32 bits tell where they are (0134). LLVM's older loader, which is left for Windows, aborts on
+    arm64 where they lie more than 4 GB apart (LLVM issue 71963).
+    """
+    return "windows" not in triple
 
 
 def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine, level: int) -> None:
@@ -197,11 +209,9 @@ def _options(level: int) -> llvm.PipelineTuningOptions:
 
 @cache
 def _jit() -> llvm.LLJIT:
-    """JITLink on arm64: LLVM's older loader aborts where code and the addresses that it reads lie
-    more than 4 GB apart, and asks for memory for both one by one (LLVM issue 71963).
-    """
-    arm64 = target().triple.startswith(("aarch64", "arm64"))
-    return llvm.create_lljit_compiler(_target_machine(target()), use_jit_link=arm64)
+    made_for = target()
+    jit_link = _in_one_block(made_for.triple)
+    return llvm.create_lljit_compiler(_target_machine(made_for), use_jit_link=jit_link)
 
 
 class Loaded(NamedTuple):
