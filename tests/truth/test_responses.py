@@ -434,6 +434,33 @@ def test_a_torus_is_born_where_the_forcing_no_longer_quenches_a_limit_cycle():
     assert abs(ds.event_force.item() - 3 * math.sqrt(2)) < 0.2  # a step of the grid
 
 
+def test_an_orbit_that_is_too_long_to_be_closed_is_known_by_its_points():
+    """A limit cycle, the unit circle, that takes 101 forcing periods: no torus."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def slow(t, x, v, *, w=1.0, rate=1 / 101):
+        growth = 1 - x**2 - v**2
+        return growth * x - rate * w * v, growth * v + rate * w * x + 0 * sl.cos(w * t)
+
+    alike = 0.1 * np.exp(20j * np.pi / 101)  # a point of the same orbit
+    starts = [(1.5, 0.0), (alike.real, alike.imag), (0.0, -0.1)]
+    ds = sl.frequency_response(slow, (0.9, 1.1, 3), starts)
+    assert ds.response_type.values.tolist() == ["long_periodic"] * 6
+    assert ds.response_period.values.tolist() == [101] * 6
+    first, second, other = ds.response_of.values.T
+    assert first.tolist() == second.tolist()
+    assert set(other.tolist()).isdisjoint(first.tolist())
+    assert (np.abs(ds.response_exponent) <= 4 * ds.response_exponent_error).all()
+    points = ds.response_x.values + 1j * ds.response_v.values
+    np.testing.assert_allclose(np.abs(points), 1.0, atol=1e-12)
+    np.testing.assert_allclose(points[:, 1:] / points[:, :-1], np.exp(2j * np.pi / 101), rtol=1e-9)
+    np.testing.assert_allclose(ds.response_peak, 1.0, atol=1e-4)
+    assert np.isnan(ds.response_multiplier_real).all()
+    said = sl.describe(ds)
+    assert "6 101T" in said
+    assert "6 responses repeat, but only after more than 64 periods" in said
+
+
 def test_multipliers_that_stay_near_the_unit_circle_bear_no_torus():
     """The product of the multipliers of an oscillator with linear damping is below one: of it no
     torus can be born.

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from saltus.analysis.attractors.growth import BLOCK, BLOCKS, MOST_STATES, growth_cost, growth_rates
+from saltus.analysis.attractors.recurrence import REPEATS
 from saltus.analysis.statistics import BOUNDED, UNCLEAR
 from saltus.flow.maps import Map
 from saltus.results.dataset.kinds import Kind
@@ -27,8 +28,6 @@ FIRST_LOOK = BLOCKS // 5
 SURE = 4.0
 #: Exponent [per iterate] that is taken for zero whatever its error.
 FLOOR = 2e-3
-#: Recurrence below this, in units of the scale, means periodic.
-REPEATS = 1e-6
 #: A recurrence that falls to this share of itself means converging.
 SETTLING = 0.05
 #: Iterates by which such an attractor is known.
@@ -193,7 +192,8 @@ def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
     if error > UNCLEAR:
         return None
     zero = max(FLOOR, min(SURE * error, BOUNDED / (len(second) * BLOCK)))
-    return (Kind.QUASI_PERIODIC.word, exponent, error) if abs(second.mean()) <= zero else None
+    bounded = max(abs(second.mean()), abs(exponent)) <= zero
+    return (Kind.QUASI_PERIODIC.word, exponent, error) if bounded else None
 
 
 def kinds_of(

@@ -4,7 +4,8 @@ frequency responses and bifurcation diagrams.
 A basin map asks one system of a great many starts, and capture by known attractors answers. Here
 every trajectory may have an attractor of its own: each is followed until it nearly recurs, Newton's
 method closes the orbit, its multipliers say that it attracts, and the trajectory must lie beside
-it. What never recurs is typed by its largest Lyapunov exponent.
+it. An orbit of more than LONGEST periods is known by its points. What never recurs is typed by its
+largest Lyapunov exponent.
 
 All this is bounded by a budget, in iterates of the motion itself (growth.py): closing orbits and
 measuring exponents may each cost BUDGET times the iterates that a motion is followed for. What
@@ -13,6 +14,7 @@ isn't typed by then is not_repeating, with where it goes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,8 +22,14 @@ import numpy as np
 
 from saltus.analysis.attractors.aperiodic import kinds_of
 from saltus.analysis.attractors.early_chaos import SEEN, looked_at, told_early
-from saltus.analysis.attractors.growth import BUDGET, NEWTON, tangent_cost
-from saltus.analysis.attractors.recurrence import recurrence, recurring_orbits
+from saltus.analysis.attractors.growth import (
+    BLOCK,
+    BUDGET,
+    NEWTON,
+    growth_rates,
+    tangent_cost,
+)
+from saltus.analysis.attractors.recurrence import late_periods, recurrence, recurring_orbits
 from saltus.analysis.attractors.settling import may_settle
 from saltus.analysis.closed import unforced
 from saltus.analysis.closed.field_zeros import autonomous
@@ -78,7 +86,7 @@ class SettledMotions:
     scale : float64[k, D]
         Range of each state in the motion.
     iterates : dict of int to float64[n, D]
-        Points of those that never repeat, KEPT_ITERATES of them at most.
+        Points of those that never repeat, or too late, KEPT_ITERATES of them at most.
     end : float64[k, D]
         Where the trajectory stood last.
     share : float64[k]
@@ -195,6 +203,7 @@ def _settle(
     if len(who):
         result.scale[who] = motion_range(map_.rows(who), result.end[who])
         who = _follow(map_, result.end, who, ROUND, result, NEAR, FOLLOWED, past)
+    who = who[~_long(map_, who, past[who], result)]
     if len(who):
         who, open_ = _classify_aperiodic(map_, who, most, result, past[who])
     if len(who):  # neither a recurrence nor an exponent: once more as long, and from farther away
@@ -341,17 +350,22 @@ def _classify_aperiodic(
     state, kinds = kinds_of(maps, start, result.scale[who], groups, BUDGET * most, known)
     result.share[who] = MEASURED
     iterates, recurs = _watched(maps, state, who, result, past)
-    tori = np.array([one is not None and one[0] == Kind.QUASI_PERIODIC.word for one in kinds])
+    chaotic = np.array([one is not None and one[0] == Kind.CHAOTIC.word for one in kinds])
+    unclear = np.ones(len(who), bool)
+    unclear[~chaotic] = ~_long(map_, who[~chaotic], iterates[~chaotic], result)
+    tori = unclear & np.array(
+        [one is not None and one[0] == Kind.QUASI_PERIODIC.word for one in kinds]
+    )
     if tori.any() and not autonomous(map_.system):
         rows = np.flatnonzero(tori)
         recurs[rows] |= may_settle(maps.rows(rows), iterates[rows], result.scale[who[rows]])
-    result.share[who], unclear = KEPT, np.ones(len(who), bool)
+    result.share[who[unclear]] = KEPT
     if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus
         recurs |= unforced.nearly_recurs(maps, result.end[who], ROUND * float(map_.period[0]))
         away = unforced.runs_away(iterates)
         result.kind[who[away]], result.share[who[away]] = Kind.ESCAPED, 1.0
     open_: dict[int, tuple[float, float]] = {}
-    for i in np.flatnonzero(np.isfinite(iterates).all(axis=(1, 2))):
+    for i in np.flatnonzero(unclear & np.isfinite(iterates).all(axis=(1, 2))):
         kind, row = kinds[i], int(who[i])
         if result.kind[row] == Kind.ESCAPED or kind is None:
             continue
@@ -383,6 +397,29 @@ def _watched(
     return iterates, apart < np.maximum(NEAR, maps.noise_of(result.scale[who]))
 
 
+def _long(
+    map_: Stroboscope, who: np.ndarray, iterates: np.ndarray, result: SettledMotions
+) -> np.ndarray:
+    """True for trajectories int64[k] that settle to an orbit of more than LONGEST periods, bool[k],
+    by their last iterates float64[k, KEPT_ITERATES, D]; writes what is known of it.
+    """
+    period = np.zeros(len(who), np.int64)
+    known = np.flatnonzero(np.isfinite(iterates).all(axis=(1, 2)))
+    if not autonomous(map_.system):
+        period[known] = late_periods(iterates[known], result.scale[who[known]])
+    at = np.flatnonzero(period)
+    if len(at):
+        rows, seen = who[at], iterates[at]
+        blocks = (seen.shape[1] - 1) // BLOCK
+        _, rates = growth_rates(map_.rows(rows), seen[:, -1], result.scale[rows], blocks, seen)
+        errors = rates.std(axis=0, ddof=1) / math.sqrt(len(rates))
+        for i, row in enumerate(rows.tolist()):
+            exponent = float(rates[:, i].mean()), float(errors[i])
+            _put_aperiodic(result, row, Kind.LONG_PERIODIC, exponent, seen[i])
+        result.orbits.period[rows] = period[at]
+    return period > 0
+
+
 def _leave_open(
     map_: Stroboscope,
     who: np.ndarray,
@@ -397,8 +434,8 @@ def _leave_open(
     if not len(rows):
         return
     iterates, recurs = _watched(map_.rows(rows), result.end[rows], rows, result)
-    finite = np.isfinite(iterates).all(axis=(1, 2))
-    for i in np.flatnonzero(finite & ~recurs):
+    known = _long(map_, rows, iterates, result) | ~np.isfinite(iterates).all(axis=(1, 2))
+    for i in np.flatnonzero(~known & ~recurs):
         row = int(rows[i])
         _put_aperiodic(result, row, Kind.NOT_REPEATING, exponents[row], iterates[i])
 

@@ -30,6 +30,8 @@ from saltus.intervals import wilson
 from saltus.results import AttractorTable
 from saltus.results.dataset.kinds import CLOSED, Kind
 
+#: Kinds that repeat after whole periods of the forcing.
+REPEATING = (Kind.PERIODIC, Kind.LONG_PERIODIC)
 #: Points kept of a motion that never repeats.
 APERIODIC_PERIODS = 64
 
@@ -292,7 +294,7 @@ def _same(
     tolerance: float,
 ) -> bool:
     """True where two trajectories at one value settled to the same response."""
-    if result.kind[a] != result.kind[b] or result.orbits.period[a] != result.orbits.period[b]:
+    if result.kind[a] != result.kind[b]:
         return False
     if (
         result.kind[a] == Kind.LIMIT_CYCLE
@@ -301,7 +303,8 @@ def _same(
         return False
     if result.kind[a] in CLOSED:
         return bool(
-            result.orbits.distance(result.orbits.points[[b], 0], result.scale[[a]], [a])[0]
+            result.orbits.period[a] == result.orbits.period[b]
+            and result.orbits.distance(result.orbits.points[[b], 0], result.scale[[a]], [a])[0]
             < tolerance
         )
     return alike(sampled(a), sampled(b))
@@ -311,7 +314,9 @@ def _order(result: SettledMotions, row: int) -> tuple[float, ...]:
     """By kind, period, then size, coarse enough that rounding can't change it."""
     period = result.orbits.period[row]
     points = (
-        result.orbits.points[row, :period] if period else result.iterates[row].mean(axis=0)[None]
+        result.iterates[row].mean(axis=0)[None]
+        if row in result.iterates
+        else result.orbits.points[row, :period]
     )
     sizes = np.atleast_1d(np.round(np.sqrt(np.mean((points / result.scale[row]) ** 2, axis=0)), 7))
     return (int(result.kind[row]), int(period), *(float(size) for size in sizes))
@@ -338,7 +343,7 @@ def table_of(found: GridResponses, numbers: Measures, grid: Grid, method: Method
     """Table of the responses."""
     map_ = grid.map(method).rows(found.place)
     kind, s, free = found.kind, found.motions, grid.every is not None
-    period = np.where(kind == Kind.PERIODIC, found.period, 0)
+    period = np.where(np.isin(kind, REPEATING), found.period, 0)
     multipliers, eigenvalues = multipliers_and_eigenvalues(
         s.orbits.multipliers[found.row], kind == Kind.EQUILIBRIUM
     )
@@ -365,7 +370,8 @@ def spans_of(found: GridResponses) -> np.ndarray:
     """Periods of each response, int64[m]: n of an nT, 1 of a limit cycle or an equilibrium, 0 of
     one that never repeats.
     """
-    return np.where(found.kind == Kind.PERIODIC, found.period, np.where(found.period > 0, 1, 0))
+    repeats = np.isin(found.kind, REPEATING)
+    return np.where(repeats, found.period, np.where(found.period > 0, 1, 0))
 
 
 def own_times(found: GridResponses, grid: Grid) -> np.ndarray | None:

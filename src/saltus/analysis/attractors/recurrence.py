@@ -9,7 +9,15 @@ import numpy as np
 from saltus.analysis.attractors.growth import NEWTON, tangent_cost
 from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.closed.orbits import find_orbits, neutral_orbits
+from saltus.analysis.solve.tolerances import LONGEST, NEAR, ROUND
 from saltus.flow.maps import Map
+
+#: Distance between points a period apart, in units of the scale, that means that they are the same.
+REPEATS = 1e-6
+#: Parts of the points of a motion, in which largest distances are compared.
+PARTS = 4
+#: Largest share to which these shrink from part to part where a motion settles.
+APPROACHING = 0.9
 
 
 def recurrence(points: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -32,6 +40,38 @@ def recurrence(points: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.nd
     return period, np.where(
         np.isfinite(last).all(axis=1), apart[np.arange(len(points)), period - 1], np.inf
     )
+
+
+def late_periods(points: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Periods of trajectories float64[k, m, D] that settle to an orbit of more than LONGEST
+    iterates, and m/2 at most, int64[k]; 0 of others.
+
+    Points that lie n iterates apart keep their distance on a torus, however near to each other they
+    are. Here they coincide, or approach one another by a share in each part of the points. Those
+    that lie fewer apart don't: that would be a slow way round a shorter orbit.
+    """
+    period, apart = recurrence(points, scale)
+    nearest = recurrence(points[:, -ROUND:], scale)[0]
+    for i in np.flatnonzero((period > LONGEST) & (apart < NEAR)):
+        ways = _ways(points[i], scale[i], int(period[i]))
+        settles = ways[-1] < REPEATS or (ways[-1] < NEAR and _approaching(ways))
+        if not settles or _approaching(_ways(points[i], scale[i], int(nearest[i]))):
+            period[i] = 0
+    return np.where((period > LONGEST) & (apart < NEAR), period, 0)
+
+
+def _ways(points: np.ndarray, scale: np.ndarray, n: int) -> np.ndarray:
+    """Largest distance between points float64[m, D] that lie n apart, in each of the last parts of
+    them, float64[PARTS].
+    """
+    part = len(points) // (2 * PARTS)
+    apart = np.abs((points[n:] - points[:-n]) / scale).max(axis=1)[-PARTS * part :]
+    ways: np.ndarray = apart.reshape(PARTS, part).max(axis=1)
+    return ways
+
+
+def _approaching(ways: np.ndarray) -> bool:
+    return bool((ways[1:] < APPROACHING * ways[:-1]).all())
 
 
 def recurring_orbits(

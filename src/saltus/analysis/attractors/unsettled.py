@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import REPEATS, SURVEY_ITERATES, mismatch, survey
+from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES, mismatch, survey
 from saltus.analysis.attractors.arrivals import Arrivals
 from saltus.analysis.attractors.attractor_set import INSIDE, AttractorSet
 from saltus.analysis.attractors.noisy import Noisy, Stray, blurred, keep_to, stray_of
-from saltus.analysis.attractors.recurrence import recurrence
+from saltus.analysis.attractors.recurrence import REPEATS, recurrence
 from saltus.analysis.solve.tolerances import ROUND
 from saltus.flow.maps import Travel
 from saltus.results.dataset.kinds import Kind

@@ -86,7 +86,8 @@ def frequency_response(
         the work: closing orbits and measuring exponents may each cost ten times as many
         periods of the motion, and 20 000 more are spent on orbits that one which seems
         quasi-periodic may settle to. What isn't typed by then is ``not_repeating``; more periods
-        spend more on it, and :func:`saltus.lyapunov` tells all exponents of one motion. What is
+        spend more on it, and :func:`saltus.lyapunov` tells all exponents of one motion. What
+        repeats after more than 64 periods, and 512 at most, is ``long_periodic``. What is
         ``chaotic`` is so for as long as it was followed (the attribute ``periods_watched``, where
         that is less than ``periods``): chaos may end later.
     seed : int

@@ -89,7 +89,8 @@ class AttractorTable:
     kind : sequence of str, length m
         ``periodic``, ``quasi_periodic`` or ``chaotic``; ``noisy_periodic`` where errors of the
         method keep an orbit from closing; of a system without forcing ``equilibrium`` or
-        ``limit_cycle`` too.
+        ``limit_cycle`` too; of responses ``long_periodic`` where an orbit is too long to be
+        closed, and ``not_repeating`` where exponents don't say.
     period : array of int, shape (m,)
         Period [forcing periods], 0 where the motion doesn't repeat, or nothing forces it.
     contacts : array, shape (m,)

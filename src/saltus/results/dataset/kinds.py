@@ -22,6 +22,8 @@ class Kind(IntEnum):
     NOISY_PERIODIC = 5
     #: Motion that hasn't repeated, and whose exponent is undecided after the time spent on it.
     NOT_REPEATING = 6
+    #: Orbit of more than LONGEST periods: it was seen to repeat, but isn't closed.
+    LONG_PERIODIC = 7
     ESCAPED = -1
     UNCONVERGED = -2
     FAILED = -3
@@ -54,6 +56,11 @@ OPEN = (
     "haven't repeated, and their exponents don't say yet whether they are quasi-periodic or "
     "chaotic: numbers are those of 64 periods. A larger periods= spends more on it; sl.lyapunov "
     "tells all exponents of one."
+)
+#: Knowledge of orbits that are too long to be closed: end of a sentence.
+LATE = (
+    f"repeat, but only after more than {LONGEST} periods: they are known by their points, with an "
+    "exponent, but no multipliers, and aren't followed."
 )
 #: The words for them by their codes.
 WITHOUT_WORDS = {int(kind): kind.word for kind in WITHOUT}

@@ -13,7 +13,7 @@ import xarray as xr
 
 from saltus.errors import counted
 from saltus.results.dataset.attractors import rows_as
-from saltus.results.dataset.kinds import OPEN, WITHOUT_WORDS, Kind, sentences
+from saltus.results.dataset.kinds import LATE, OPEN, WITHOUT_WORDS, Kind, sentences
 from saltus.results.dataset.schema import (
     ResultKind,
     first_size,
@@ -83,6 +83,8 @@ def account(ds: xr.Dataset) -> list[str]:
     lines += _ends(ds)
     if left := _count_of(ds, Kind.NOT_REPEATING):
         lines.append(f"open     {counted(left, 'response')} {OPEN}")
+    if long := _count_of(ds, Kind.LONG_PERIODIC):
+        lines.append(f"long     {counted(long, 'response')} {LATE}")
     lines += _chaotic(ds)
     lines += [
         settled(labels),
@@ -249,6 +251,8 @@ def _notes(ds: xr.Dataset, more: int = 0) -> tuple[str, ...]:
         notes.append(f"{more} shorter branches are in the file.")
     if left := _count_of(ds, Kind.NOT_REPEATING):
         notes.append(f"{left} responses {OPEN}")
+    if long := _count_of(ds, Kind.LONG_PERIODIC):
+        notes.append(f"{long} responses {LATE}")
     return (*notes, *sentences(labels))
 
 

@@ -373,6 +373,16 @@ def test_weak_growth_that_fluctuates_is_measured_until_it_is_no_zero():
     assert weak.asked > 192
 
 
+def test_growth_that_ends_late_is_no_torus():
+    """0.02 an iterate in the first half of a measurement, nothing in the second: growth along a
+    torus is bounded from the beginning on.
+    """
+    noise = np.random.default_rng(3).normal(0, 0.05, (144, 1))
+    grows = np.repeat([0.02, 0.0], 72)[:, None]
+    assert kind_of_growth(noise - noise.mean() + grows) is None
+    assert kind_of_growth(noise - noise.mean())[0] == "quasi_periodic"
+
+
 def test_what_is_told_at_once_is_not_measured_again():
     for mean, name in ((8 * 0.3, "chaotic"), (0.0, "quasi_periodic")):
         motion = Fluctuating(mean, 1e-3)
