@@ -425,7 +425,7 @@ def test_ctrl_c(server, undisturbed, tmp_path, goal):
     """
     folder = tmp_path / "out"
     child = server.start(*arguments(server, folder), pause=0.02, pictures=True)
-    wait_for(lambda: (folder / "stores" / "basins").exists() and committed(folder) >= goal)
+    wait_for(lambda: (folder / "study.toml").exists() and committed(folder) >= goal)
     time.sleep(0.05)
     os.kill(child, signal.SIGINT)
     code, text = server.end(child)
