@@ -438,8 +438,8 @@ def test_an_orbit_that_is_too_long_to_be_closed_is_known_by_its_points():
     """A limit cycle, the unit circle, that takes 101 forcing periods: no torus."""
 
     @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
-    def slow(t, x, v, *, w=1.0, rate=1 / 101):
-        growth = 1 - x**2 - v**2
+    def slow(t, x, v, *, w=1.0, rate=1 / 101, pull=1.0):
+        growth = pull * (1 - x**2 - v**2)
         return growth * x - rate * w * v, growth * v + rate * w * x + 0 * sl.cos(w * t)
 
     alike = 0.1 * np.exp(20j * np.pi / 101)  # a point of the same orbit
@@ -457,6 +457,10 @@ def test_an_orbit_that_is_too_long_to_be_closed_is_known_by_its_points():
     np.testing.assert_allclose(ds.response_peak, 1.0, atol=1e-4)
     assert np.isnan(ds.response_multiplier_real).all()
     said = sl.describe(ds)
+    on_its_way = sl.frequency_response(slow.with_values(pull=3e-4), [1.0], [(1.5, 0.0)])
+    assert on_its_way.response_type.item() == "long_periodic"
+    points = np.hypot(on_its_way.response_x, on_its_way.response_v)
+    np.testing.assert_allclose(points, 1.0, atol=1e-3)  # the last ones, not the first ones kept
     assert "6 101T" in said
     assert "6 responses repeat, but only after more than 64 periods" in said
 

@@ -415,7 +415,8 @@ def _long(
         errors = rates.std(axis=0, ddof=1) / math.sqrt(len(rates))
         for i, row in enumerate(rows.tolist()):
             exponent = float(rates[:, i].mean()), float(errors[i])
-            _put_aperiodic(result, row, Kind.LONG_PERIODIC, exponent, seen[i])
+            last_first = np.roll(seen[i], period[at[i]], axis=0)  # it was nearest in the end
+            _put_aperiodic(result, row, Kind.LONG_PERIODIC, exponent, last_first)
         result.orbits.period[rows] = period[at]
     return period > 0
 
