@@ -465,6 +465,28 @@ def test_an_orbit_that_is_too_long_to_be_closed_is_known_by_its_points():
     assert "6 responses repeat, but only after more than 64 periods" in said
 
 
+def test_nothing_is_left_of_deviations_along_a_long_orbit_that_rests():
+    """A ball on a shaken table: where its chatter ends it is at rest, and leaves when the table lets
+    it go, whatever came before. Of most accelerations it repeats late.
+    """
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def ball(t, x, v, *, shaken=4.0, restitution=0.6, w=1.0):
+        return v, -1 + shaken * sl.cos(w * t), sl.impact(x > 0, -v, restitution=restitution)
+
+    ds = sl.bifurcation_diagram(ball, {"shaken": (2.5, 5.5, 16)}, [(0.1, 0.0)])
+    long = ds.isel(response=ds.response_type.values == "long_periodic")
+    assert long.sizes["response"] > 2
+    assert (long.response_period > 64).all()
+    assert (long.response_exponent == -np.inf).all()
+    assert (long.response_exponent_error == 0.0).all()
+    for i, n in enumerate(long.response_period.values.tolist()):
+        values = {"shaken": float(long.response_shaken[i])}
+        start = [float(long[name][i, 0]) for name in ("response_x", "response_v")]
+        end = sl.stroboscope(ball.with_values(**values), start, n, keep=1)
+        assert abs(end.x.values.ravel()[-1] - start[0]) < 1e-6 * float(long.response_peak[i])
+
+
 def test_multipliers_that_stay_near_the_unit_circle_bear_no_torus():
     """The product of the multipliers of an oscillator with linear damping is below one: of it no
     torus can be born.

@@ -412,7 +412,9 @@ def _long(
         rows, seen = who[at], iterates[at]
         blocks = (seen.shape[1] - 1) // BLOCK
         _, rates = growth_rates(map_.rows(rows), seen[:, -1], result.scale[rows], blocks, seen)
-        errors = rates.std(axis=0, ddof=1) / math.sqrt(len(rates))
+        vanishes = np.isneginf(rates).any(axis=0)  # at rest on a stop nothing is left of deviations
+        with np.errstate(invalid="ignore"):
+            errors = np.where(vanishes, 0.0, rates.std(axis=0, ddof=1) / math.sqrt(len(rates)))
         for i, row in enumerate(rows.tolist()):
             exponent = float(rates[:, i].mean()), float(errors[i])
             last_first = np.roll(seen[i], period[at[i]], axis=0)  # it was nearest in the end

@@ -234,10 +234,12 @@ def locate(
 
 def _turn(rise: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
     """The share of a step at which a cubic turns back, from its rise and its slopes at the ends,
-    which have different signs.
+    which have different signs; a half where rounding has given them the same.
     """
     bend, twist = 3.0 * rise - 2.0 * first - last, first + last - 2.0 * rise
-    return np.asarray(-first / (bend - np.sign(first) * np.sqrt(bend**2 - 3.0 * twist * first)))
+    square = bend**2 - 3.0 * twist * first
+    share = -first / (bend - np.sign(first) * np.sqrt(np.maximum(square, 0.0)))
+    return np.where(square >= 0.0, share, 0.5)
 
 
 def _folds(
