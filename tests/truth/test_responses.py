@@ -466,8 +466,8 @@ def test_an_orbit_that_is_too_long_to_be_closed_is_known_by_its_points():
 
 
 def test_nothing_is_left_of_deviations_along_a_long_orbit_that_rests():
-    """A ball on a shaken table: where its chatter ends it is at rest, and leaves when the table lets
-    it go, whatever came before. Of most accelerations it repeats late.
+    """A ball on a shaken table is at rest where its chatter ends, and leaves when the table lets it
+    go, whatever came before. At many accelerations it repeats late.
     """
 
     @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
