@@ -429,18 +429,19 @@ def _leave_open(
     exponents: dict[int, tuple[float, float]],
     result: SettledMotions,
 ) -> None:
-    """Label trajectories still unclassified: not repeating where the exponent is unclear and
-    nothing recurs, else unconverged, since more iterates may tell.
+    """Label trajectories still unclassified: orbits that repeat late; not repeating where the
+    exponent is unclear and nothing recurs; else unconverged, since more iterates may tell.
     """
     result.kind[who] = Kind.UNCONVERGED
-    rows = np.array([row for row in who.tolist() if row in exponents], np.int64)
+    forced = not autonomous(map_.system)  # any of these may repeat late
+    rows = np.array([row for row in who.tolist() if forced or row in exponents], np.int64)
     if not len(rows):
         return
     iterates, recurs = _watched(map_.rows(rows), result.end[rows], rows, result)
     known = _long(map_, rows, iterates, result) | ~np.isfinite(iterates).all(axis=(1, 2))
     for i in np.flatnonzero(~known & ~recurs):
-        row = int(rows[i])
-        _put_aperiodic(result, row, Kind.NOT_REPEATING, exponents[row], iterates[i])
+        if (row := int(rows[i])) in exponents:
+            _put_aperiodic(result, row, Kind.NOT_REPEATING, exponents[row], iterates[i])
 
 
 def _put_aperiodic(

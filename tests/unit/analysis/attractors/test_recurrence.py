@@ -9,7 +9,11 @@ import math
 import numpy as np
 import pytest
 
+import saltus as sl
+from saltus.analysis.attractors.find_responses import SettledMotions, _leave_open
 from saltus.analysis.attractors.recurrence import late_periods
+from saltus.flow.maps import Stroboscope
+from saltus.results.dataset.kinds import Kind
 
 GOLDEN = 2 * math.pi * (3 - math.sqrt(5)) / 2
 
@@ -54,3 +58,19 @@ def test_chaos_has_no_long_period():
     for k in range(1023):
         points[0, k + 1] = 3.9 * points[0, k] * (1 - points[0, k])
     assert late_periods(points, np.ones((1, 1))).tolist() == [0]
+
+
+@pytest.mark.parametrize(("period", "kind"), [(64, "UNCONVERGED"), (101, "LONG_PERIODIC")])
+@pytest.mark.parametrize("exponents", [{}, {0: (0.0, 1.0)}])
+def test_what_is_open_at_last_is_asked_whether_it_repeats_late(period, kind, exponents):
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def ring(t, x, v, *, w=1.0, rate=1 / 101):
+        growth = 1 - x**2 - v**2
+        return growth * x - rate * w * v, growth * v + rate * w * x + 0 * sl.cos(w * t)
+
+    result = SettledMotions.empty(1, 2)
+    result.end[:], result.scale[:] = (0.0, 1.0), 2.0
+    map_ = Stroboscope(ring.with_values(rate=1 / period), sl.Taylor(), threads=1)
+    _leave_open(map_, np.array([0]), exponents, result)
+    assert Kind(result.kind[0]).name == kind
+    assert result.orbits.period[0] == (period if kind == "LONG_PERIODIC" else 0)
