@@ -101,7 +101,7 @@ def test_a_ball_that_takes_on_the_velocity_of_its_table_but_passes_it():
     assert nearest(found, "fold", exact) == pytest.approx(exact, rel=1e-14)
 
 
-def test_a_stiff_spring_behind_a_gap_begins_at_the_graze_of_the_closed_form():
+def test_a_stiff_spring_behind_a_stopbegins_at_the_graze_of_the_closed_form():
     exact = float(rows("laws_more")["M01"])
     x = 0.7 * 0.75**2 / (1 - 0.75**2 + 0.015j)  # the response without contact
     found = sl.branches(
@@ -144,14 +144,34 @@ def test_a_branch_goes_on_with_another_impact_behind_a_graze():
         np.testing.assert_allclose(end, start, atol=1e-8)
 
 
-def flown(state, frequency):
+def test_of_alike_impacts_the_one_that_vanishes_may_be_any():
+    """It was taken for the first one: the branch was lost where another one vanished."""
+    system = IMPACT("chatter", restitution=0.5)
+    found = sl.branches(
+        system, {"frequency": (0.65, 1.05)}, at=2, switch=(), threads=1, progress=False
+    )
+    assert (found.branch_begin.values, found.branch_end.values) == (["range"], ["range"])
+    impacts = found.point_contacts.values
+    for number in (3, 2, 1):
+        mine = np.flatnonzero(impacts == number)
+        assert len(mine) > 5
+        i = mine[-3] if number == 1 else mine[3]  # these attract
+        frequency = float(found.point_frequency[i])
+        start = [float(found[f"point_{name}"].values[i, 0]) for name in ("x", "v")]
+        end, count = flown(start, frequency, stop=0.2, kept=0.5)
+        assert count == number
+        np.testing.assert_allclose(end, start, atol=1e-8)
+    assert (found.event_kind == "graze").sum() == 2
+
+
+def flown(state, frequency, stop=1.0, kept=0.8):
     """The state after a forcing period, and the impacts on the way."""
 
     def rates(t, z):
         return z[1], np.cos(frequency * t) - 0.1 * z[1] - z[0]
 
     def gap(_, z):
-        return z[0] - 1.0
+        return z[0] - stop
 
     gap.terminal, gap.direction = True, 1.0
     t, end, count = 0.0, 2 * np.pi / frequency, 0
@@ -160,7 +180,7 @@ def flown(state, frequency):
         if run.status != 1:
             return run.y[:, -1], count
         t, (x, v), count = run.t[-1], run.y[:, -1], count + 1
-        state = [min(x, 1.0), -0.8 * v]
+        state = [min(x, stop), -kept * v]
 
 
 #: Its branch over the frequency passes a graze and a period doubling.

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import both_sides, tangents
+from saltus.analysis.branches.arclength import Arc, both_sides, tangents
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.contact_sequences import ContactSequence, sequences
 from saltus.analysis.branches.events import Event
@@ -108,9 +108,19 @@ def _leg_branch(plan: Plan, start: Start) -> Branch | None:
         return _branch(plan, orbits, sequence, start)
     if start.n > plan.longest:  # a chatter of many periods
         return None
-    (branch,) = both_ways(plan, [start])
+    beyond = dict[int, np.ndarray]()
+
+    def flies(orbits: PeriodicOrbits, curve: Arc) -> str:
+        one = sequences(orbits, curve.z[-1][None])[0]
+        if one is None or not one.flies:
+            return ""
+        beyond.setdefault(id(curve), curve.z[-1])
+        return "held"
+
+    (branch,) = both_ways(plan, [start], flies)
     if branch is not None:
         branch.ends = _where_held(orbits, branch)
+        branch.beyond = list(beyond.values())
     return branch
 
 

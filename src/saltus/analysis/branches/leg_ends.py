@@ -110,7 +110,7 @@ def _impact_vanishes(legs: Legs, z: np.ndarray, place: int) -> Passage | None:
     if event is None:
         return None
     contact = legs.contacts[place]
-    start, _ = with_impact(event, contact, legs)
+    start, _ = with_impact(event, contact, legs, place, float(legs.nodes(z[None])[0][0, place]))
     along = event.legs.tangent(event.z)
     away = _touching(event) @ along
     side = -contact.direction  # of the gap where the stop isn't met
@@ -132,10 +132,15 @@ def _touching(event: ContactChange) -> np.ndarray:
 
 
 def with_impact(
-    event: ContactChange, contact: SequenceContact, like: Legs | None
+    event: ContactChange,
+    contact: SequenceContact,
+    like: Legs | None = None,
+    number: int = 0,
+    near: float = 0.0,
 ) -> tuple[np.ndarray, Legs]:
     """The orbit of a graze with the impact without speed among its contacts, float64[z], and its
-    equations: those of another orbit if they are given.
+    equations: those of another orbit if they are given, in which the impact has this number and
+    comes near this phase.
     """
     legs, z = event.legs, event.z
     phase, before, others = legs.nodes(z[None])
@@ -155,12 +160,11 @@ def with_impact(
         each = np.append(1.0, legs.free_scale[: legs.size])
         unit = legs.free_scale[legs.n * legs.size :]
         like = Legs(legs.orbits, sequence, np.append(np.tile(each, len(nodes)), unit)[None])
-    else:  # in the order in which its contacts are numbered
-        order = next(
-            by for by in range(len(contacts)) if (*contacts[by:], *contacts[:by]) == like.contacts
-        )
+    else:  # in the order in which its contacts are numbered, which may all be alike
+        order = (where - number) % len(contacts)
         nodes[:order, 0] += legs.n
         nodes = np.roll(nodes, -order, axis=0)
+        nodes[:, 0] += legs.n * np.round((near - nodes[number, 0]) / legs.n)
     return np.append(nodes.ravel(), others[0]), like
 
 
@@ -209,7 +213,7 @@ def _appears(
         return None
     if contact.kind != st.IMPACT:
         return _by_free_flow(event, event.z, tangent)
-    start, onto = with_impact(event, contact, None)
+    start, onto = with_impact(event, contact)
     along = onto.tangent(start)
     place = event.place + 1 if legs.contacts else 0
     step = 1e-6 * along * onto.scale[0]

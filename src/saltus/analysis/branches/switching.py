@@ -46,7 +46,7 @@ class Seed:
 
 
 def children(branch: Branch, number: int, switch: frozenset[str], longest: int) -> Iterator[Seed]:
-    """Seeds at the events of a branch, and the orbits of half the period at its ends.
+    """Seeds at the events of a branch, the orbits of half the period at its ends, and those beyond.
 
     Parameters
     ----------
@@ -83,6 +83,8 @@ def children(branch: Branch, number: int, switch: frozenset[str], longest: int) 
             points = branch.orbits.points(z)
             middle = 0.5 * (points[:half] + points[half:])
             yield Seed(middle, z[branch.orbits.n * size :], branch.scale[:size])
+    for z in branch.beyond:
+        yield Seed(branch.orbits.points(z), z[branch.orbits.n * size :], branch.scale[:size])
 
 
 def _doubled(branch: Branch, event: Event) -> np.ndarray:

@@ -57,3 +57,23 @@ def test_a_branch_that_is_lost_in_a_chatter_says_so():
     found = sl.branches(chatter, vary, at=2, switch=(), progress=False)
     assert "held" in {*found.branch_begin.values, *found.branch_end.values}
     assert "the chatter before a held contact changes" in sl.describe(found)
+
+
+def test_a_branch_of_orbits_that_rest_ends_where_the_chatter_is_cut_short():
+    """Beyond, each orbit flies: these are a branch of their own, back to where its grazes
+    accumulate, one after the other.
+    """
+    chatter = sl.models.impact_oscillator("chatter", restitution=0.5)
+    found = sl.branches(
+        chatter, {"frequency": ("0.55 rad/s", "0.57 rad/s")}, at=2, switch=(), progress=False
+    )
+    rests = np.array(["at rest" in one for one in found.point_itinerary.values])
+    values, of = found.point_frequency.values, found.point_branch.values
+    assert all(len(set(rests[of == branch])) == 1 for branch in range(found.sizes["branch"]))
+    assert found.branch_end.values[of[np.argmax(np.where(rests, values, 0))]] == "held"
+    number = of[np.argmin(np.where(rests, 1, values))]
+    assert found.branch_begin.values[number] == "accumulates"
+    limit = found.branch_begin_limit.values[number]
+    assert values[rests].max() < limit < values[~rests].min()
+    assert values[~rests].min() - values[rests].max() < 1e-4
+    assert found.branch_end.values[number] == "range"
