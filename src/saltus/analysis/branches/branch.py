@@ -37,15 +37,15 @@ class Branch(Piece):
         The parameter at which they do, at either end; NaN otherwise.
     parent : (int, int) or None
         The branch and its event that it leaves.
-    beyond : list of float64[z]
-        Orbits beyond its ends that are followed in another way.
+    flying : list of float64[z]
+        Orbits beyond its ends on which no contact is held any more: they are on another branch.
     """
 
     orbits: PeriodicOrbits | EquilibriumCurves | ClosedHarmonics
     ends: tuple[str, str]
     parent: tuple[int, int] | None = None
     limits: tuple[float, float] = (np.nan, np.nan)
-    beyond: list[np.ndarray] = field(default_factory=list)
+    flying: list[np.ndarray] = field(default_factory=list)
 
     @property
     def closed(self) -> bool:

@@ -108,19 +108,19 @@ def _leg_branch(plan: Plan, start: Start) -> Branch | None:
         return _branch(plan, orbits, sequence, start)
     if start.n > plan.longest:  # a chatter of many periods
         return None
-    beyond = dict[int, np.ndarray]()
+    flying = dict[int, np.ndarray]()
 
     def flies(orbits: PeriodicOrbits, curve: Arc) -> str:
         one = sequences(orbits, curve.z[-1][None])[0]
         if one is None or not one.flies:
             return ""
-        beyond.setdefault(id(curve), curve.z[-1])
+        flying.setdefault(id(curve), curve.z[-1])
         return "held"
 
     (branch,) = both_ways(plan, [start], flies)
     if branch is not None:
         branch.ends = _where_held(orbits, branch)
-        branch.beyond = list(beyond.values())
+        branch.flying = list(flying.values())
     return branch
 
 

@@ -46,7 +46,7 @@ class Seed:
 
 
 def children(branch: Branch, number: int, switch: frozenset[str], longest: int) -> Iterator[Seed]:
-    """Seeds at the events of a branch, the orbits of half the period at its ends, and those beyond.
+    """Seeds at the events of a branch, the orbits of half the period at its ends, those that fly.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def children(branch: Branch, number: int, switch: frozenset[str], longest: int) 
             points = branch.orbits.points(z)
             middle = 0.5 * (points[:half] + points[half:])
             yield Seed(middle, z[branch.orbits.n * size :], branch.scale[:size])
-    for z in branch.beyond:
+    for z in branch.flying:
         yield Seed(branch.orbits.points(z), z[branch.orbits.n * size :], branch.scale[:size])
 
 
