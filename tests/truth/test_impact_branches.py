@@ -226,3 +226,21 @@ def test_a_branch_through_a_graze_ends_with_its_work(monkeypatch):
     check_part(part)
     assert "points" in (part.branch_begin.values[0], part.branch_end.values[0])
     assert "all the work was done: branches end early, 0 orbits weren't" in sl.describe(part)
+
+
+def test_an_impact_that_crosses_the_whole_period_bends_no_branch():
+    """States at whole periods jump there; points that were put between for the picture lay on a
+    part of the branch that had been passed, and outside the range.
+    """
+    system = sl.structure(
+        np.diag([1.2403, 1.17315]), [[744.2159, -398.612], [-398.612, 398.612]],
+        [[1.9004, -0.51576], [-0.51576, 1.4025]], names=["a", "b"], frequency=3.4,
+        contacts=[sl.Contact("a", restitution=0.47151, gap=2.14152e-3)],
+        forces=[sl.Force("a", 5.12103)],
+    )  # fmt: skip
+    found = sl.bifurcation_diagram(system, {"frequency": (3.387, 5.494, 6)}, progress=False)
+    assert "fold" not in found.event_kind.values
+    for branch in range(found.sizes["branch"]):
+        along = found.point_frequency.values[found.point_branch.values == branch]
+        assert (np.diff(along) > 0).all()
+    assert 3.387 <= found.point_frequency.min() <= found.point_frequency.max() <= 5.494

@@ -77,16 +77,20 @@ class LegBranch(Branch):
             ]
             self.unexplained += [count + place for place in part.unexplained]
             count += len(part.z)
-        self._complete()
+        self._complete(np.concatenate([piece.tangent[:, -1] for piece in pieces]))
         return self
 
-    def _complete(self) -> None:
-        """Tangents and derivatives in the unknowns with the contact sequence left to the flow."""
+    def _complete(self, onward: np.ndarray) -> None:
+        """Tangents and derivatives in the unknowns with the contact sequence left to the flow.
+        These jump where an impact crosses the whole period: the sign of a tangent is that by which
+        the parameter grows there, ``onward`` float64[p].
+        """
         count, places = len(self.z), np.array([*self.z, *(event.z for event in self.events)])
         derivative = self.orbits.evaluate(places, np.full(len(places), self.row))[1]
         known = np.where(np.isfinite(derivative), derivative, 0.0)
         ahead = np.gradient(self.z / self.scale, axis=0) if count > 1 else self.z * 0.0
         self.derivative, self.tangent = derivative[:count], tangents(known[:count], ahead)
+        self.tangent[self.tangent[:, -1] * onward < 0] *= -1.0
         ways = tangents(known[count:], self.tangent[[event.after for event in self.events]])
         self.events = [
             replace(event, derivative=matrix, tangent=way)

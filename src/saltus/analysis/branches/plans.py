@@ -49,13 +49,15 @@ def plan_of(
     """
     jumps = any(guard.law is not None and guard.law.reset for guard in system.guards)
     symmetric = not twins and is_symmetric(system, {name: limits})
+    by_legs = jumps and has_legs(system)
     return Plan(
         lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads, symmetric),
         limits,
         points,
         longest,
         frozenset(switch),
-        leg_branches if jumps and has_legs(system) else both_ways,
+        leg_branches if by_legs else both_ways,
+        abreast=not by_legs,
         stable=stable,
         watch=Watch(most),
     )

@@ -15,6 +15,9 @@ CHANGE = 0.08
 SEEN = 0.005
 #: Halvings of an interval.
 ROUNDS = 4
+#: Cosine between a step and the tangents at its ends below which the states jump on the way: an
+#: impact crosses the whole period at which they are told.
+ALONG = 0.5
 
 #: Sizes float64[r] of orbits float64[r, z] of a branch.
 Sizes = Callable[[Branch, np.ndarray], np.ndarray]
@@ -29,8 +32,18 @@ def resolve(branches: Sequence[Branch], sizes: Sizes) -> None:
         for _ in range(ROUNDS):
             change = np.abs(np.diff(size))
             larger = np.maximum(size[1:], size[:-1])
-            wide = np.flatnonzero((change > CHANGE * larger) & (change > SEEN * largest))
+            seen = (change > CHANGE * larger) & (change > SEEN * largest)
+            wide = np.flatnonzero(seen & _smooth(branch))
             new = refine(branch, wide.tolist()) if len(wide) else wide
             if not len(new):
                 break
             size = np.insert(size, new - np.arange(len(new)), sizes(branch, branch.z[new]))
+
+
+def _smooth(branch: Branch) -> np.ndarray:
+    """True for steps from point to point along the tangents at both ends, bool[p - 1]."""
+    step = np.diff(branch.z, axis=0) / branch.scale
+    least = ALONG * np.linalg.norm(step, axis=1)
+    ways = [np.einsum("ki,ki->k", step, one) for one in (branch.tangent[:-1], branch.tangent[1:])]
+    smooth: np.ndarray = np.minimum(*ways) >= least
+    return smooth

@@ -46,7 +46,7 @@ class Seed:
 
 
 def children(branch: Branch, number: int, switch: frozenset[str], longest: int) -> Iterator[Seed]:
-    """Seeds at the events of a branch, the orbits of half the period at its ends, those that fly.
+    """Seeds at the events of a branch, and at its ends: orbits of half the period, orbits that fly.
 
     Parameters
     ----------

@@ -66,6 +66,8 @@ class Plan:
     follow : callable
         The branches of starts of one shape, such as :func:`both_ways`; None where there is none, or
         it is that of a start before.
+    abreast : bool
+        That follows several starts side by side, which costs little more than one.
     leave : callable
         Seeds of the branches that leave one: see :func:`children`.
     crossed : bool
@@ -83,6 +85,7 @@ class Plan:
     longest: int
     switch: frozenset[str]
     follow: Callable[[Plan, Sequence[Start]], list[Branch | None]]
+    abreast: bool = True
     leave: Callable[[Any, int, frozenset[str], int], Iterator[Seed]] = children
     crossed: bool = False
     stable: bool = False
@@ -104,7 +107,7 @@ def trace(
     waiting, begun, share = list(seeds), 0, 0.0
     try:
         while waiting and not plan.watch.over:
-            beside = _abreast(waiting)
+            beside = _abreast(waiting) if plan.abreast else [waiting.pop(0)]
             begun += len(beside)
             before, share = share, max(share, begun / (begun + len(waiting)))
             plan.watch.begin(stage(progress, before, share))
