@@ -465,6 +465,25 @@ def test_an_orbit_that_is_too_long_to_be_closed_is_known_by_its_points():
     assert "6 responses repeat, but only after more than 64 periods" in said
 
 
+@pytest.mark.parametrize("r", [3.9925202813007035, 3.9962199905499762])
+def test_chaos_in_bands_that_are_thin_as_lines_is_chaotic(r):
+    """The logistic map in a window of period 8: each eighth point comes back to 5e-4 of the range,
+    as on the way to an orbit.
+    """
+
+    @sl.system(states="x p", forced_at="w", units={"w": "rad/s"})
+    def logistic(t, x, p, *, w=1.0, r=r):
+        return 0 * x, w * sl.cos(w * t) - (p - sl.sin(w * t)), sl.jump(p > 0.5, x=r * x * (1 - x))
+
+    ds = sl.bifurcation_diagram(logistic, {"r": [r]}, [(0.49, 0.0), (0.3, 0.0)])
+    assert (ds.type == "chaotic").all()
+    x, total, count = 0.49, 0.0, 40_000
+    for _ in range(count):
+        total, x = total + math.log(abs(r * (1 - 2 * x))), r * x * (1 - x)
+    apart = np.abs(ds.response_exponent.values - total / count / (2 * math.pi))
+    assert (apart < 5 * ds.response_exponent_error.values).all()
+
+
 def test_nothing_is_left_of_deviations_along_a_long_orbit_that_rests():
     """A ball on a shaken table is at rest where its chatter ends, and leaves when the table lets it
     go, whatever came before. At many accelerations it repeats late.

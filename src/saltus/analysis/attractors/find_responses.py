@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import kinds_of
+from saltus.analysis.attractors.aperiodic import FLOOR, kinds_of
 from saltus.analysis.attractors.early_chaos import SEEN, looked_at, told_early
 from saltus.analysis.attractors.growth import (
     BLOCK,
@@ -43,7 +43,7 @@ from saltus.flow.modal import Modal
 from saltus.flow.request import Schedule
 from saltus.flow.threads import on_threads, usable_processors
 from saltus.kernels import status as st
-from saltus.results.dataset.kinds import Kind
+from saltus.results.dataset.kinds import LATEST, Kind
 
 #: Most trajectories that one thread follows at a time, so that all threads have work, and Ctrl-C
 #: finds some done.
@@ -65,8 +65,10 @@ KEPT = 0.7
 RANGE_PERIODS = 4
 #: Samples in each of these periods.
 SAMPLES_PER_PERIOD = 32
+#: Standard errors above zero by which deviations still grow where a motion was chaotic before.
+STILL = 2.0
 #: Iterates that are kept of a motion that never repeats.
-KEPT_ITERATES = 1024
+KEPT_ITERATES = 2 * LATEST
 
 
 @dataclass
@@ -340,7 +342,7 @@ def _settled_unforced(
 
 def _classify_aperiodic(
     map_: Stroboscope, who: np.ndarray, most: int, result: SettledMotions, past: np.ndarray
-) -> tuple[np.ndarray, dict[int, tuple[float, float]]]:
+) -> tuple[np.ndarray, dict[int, tuple[str, float, float]]]:
     """Classify trajectories that don't recur by their exponents; writes what is known, returns
     those that stay unclear, and the exponents, with their errors, that don't say what a motion is.
     ``past``: their last iterates, float64[k, KEPT_ITERATES, D].
@@ -364,14 +366,15 @@ def _classify_aperiodic(
         recurs |= unforced.nearly_recurs(maps, result.end[who], ROUND * float(map_.period[0]))
         away = unforced.runs_away(iterates)
         result.kind[who[away]], result.share[who[away]] = Kind.ESCAPED, 1.0
-    open_: dict[int, tuple[float, float]] = {}
+    open_: dict[int, tuple[str, float, float]] = {}
     for i in np.flatnonzero(unclear & np.isfinite(iterates).all(axis=(1, 2))):
         kind, row = kinds[i], int(who[i])
         if result.kind[row] == Kind.ESCAPED or kind is None:
             continue
-        if kind[0] == Kind.NOT_REPEATING.word:
-            open_[row] = kind[1:]
-        elif not (recurs[i] and (kind[0] != Kind.CHAOTIC.word or not autonomous(map_.system))):
+        near = recurs[i] and (kind[0] != Kind.CHAOTIC.word or not autonomous(map_.system))
+        if kind[0] == Kind.NOT_REPEATING.word or (near and kind[0] == Kind.CHAOTIC.word):
+            open_[row] = kind
+        elif not near:
             unclear[i] = False
             _put_aperiodic(result, row, Kind[kind[0].upper()], kind[1:], iterates[i])
     return who[unclear & (result.kind[who] != Kind.ESCAPED)], open_
@@ -410,8 +413,7 @@ def _long(
     at = np.flatnonzero(period)
     if len(at):
         rows, seen = who[at], iterates[at]
-        blocks = (seen.shape[1] - 1) // BLOCK
-        _, rates = growth_rates(map_.rows(rows), seen[:, -1], result.scale[rows], blocks, seen)
+        rates = _growth_along(map_.rows(rows), seen, result.scale[rows])
         vanishes = np.isneginf(rates).any(axis=0)  # at rest on a stop nothing is left of deviations
         with np.errstate(invalid="ignore"):
             errors = np.where(vanishes, 0.0, rates.std(axis=0, ddof=1) / math.sqrt(len(rates)))
@@ -423,14 +425,21 @@ def _long(
     return period > 0
 
 
+def _growth_along(map_: Stroboscope, iterates: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Rates of growth along iterates float64[k, m, D], float64[blocks, k]."""
+    blocks = (iterates.shape[1] - 1) // BLOCK
+    return growth_rates(map_, iterates[:, -1], scale, blocks, iterates)[1]
+
+
 def _leave_open(
     map_: Stroboscope,
     who: np.ndarray,
-    exponents: dict[int, tuple[float, float]],
+    exponents: dict[int, tuple[str, float, float]],
     result: SettledMotions,
 ) -> None:
-    """Label trajectories still unclassified: orbits that repeat late; not repeating where the
-    exponent is unclear and nothing recurs; else unconverged, since more iterates may tell.
+    """Label trajectories still unclassified: orbits that repeat late; chaotic where it was, and
+    deviations still grow; not repeating where the exponent is unclear and nothing recurs; else
+    unconverged, since more iterates may tell.
     """
     result.kind[who] = Kind.UNCONVERGED
     forced = not autonomous(map_.system)  # any of these may repeat late
@@ -439,9 +448,15 @@ def _leave_open(
         return
     iterates, recurs = _watched(map_.rows(rows), result.end[rows], rows, result)
     known = _long(map_, rows, iterates, result) | ~np.isfinite(iterates).all(axis=(1, 2))
-    for i in np.flatnonzero(~known & ~recurs):
-        if (row := int(rows[i])) in exponents:
-            _put_aperiodic(result, row, Kind.NOT_REPEATING, exponents[row], iterates[i])
+    for i in np.flatnonzero(~known):
+        row = int(rows[i])
+        kind, *exponent = exponents.get(row, ("", np.nan, np.nan))
+        sure = kind == Kind.NOT_REPEATING.word and not recurs[i]
+        if kind == Kind.CHAOTIC.word:
+            rates = _growth_along(map_.rows(rows[[i]]), iterates[[i]], result.scale[[row]])
+            sure = bool(rates.mean() > max(STILL * rates.std() / math.sqrt(len(rates)), FLOOR))
+        if sure:
+            _put_aperiodic(result, row, Kind[kind.upper()], (exponent[0], exponent[1]), iterates[i])
 
 
 def _put_aperiodic(

@@ -37,11 +37,14 @@ class Kind(IntEnum):
 
 #: Longest period at which a motion is known to repeat [forcing periods]; no argument raises it.
 LONGEST = 64
-#: Sentence on motions without a type, in every result.
+#: The same of a forced motion among responses.
+LATEST = 512
+#: Sentences on motions without a type, in every result, and on such responses.
 LONGER = (
     f"An orbit is recognised up to {LONGEST} periods, which no argument raises: a longer one has "
     "no type. sl.stroboscope and sl.poincare show its points."
 )
+LONGER_RESPONSE = LONGER.replace("An", "A forced", 1).replace(str(LONGEST), str(LATEST), 1)
 #: Kinds that Newton's method closes.
 CLOSED = (Kind.PERIODIC, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE)
 #: Fate of starts that lead to no attractor, as the end of a sentence.

@@ -100,9 +100,9 @@ def missed(starts: int, where: str = "") -> list[str]:
     return [f"{counted(starts, 'start')}{where}: other attractors{size} may be missed"]
 
 
-def untyped(labels: xr.DataArray, *codes: Kind) -> list[str]:
+def untyped(labels: xr.DataArray, *codes: Kind, longer: str = LONGER) -> list[str]:
     """Line on motions without a type, if there are starts with one of these codes."""
-    return [f"untyped  {LONGER}"] if np.isin(labels.values, codes).any() else []
+    return [f"untyped  {longer}"] if np.isin(labels.values, codes).any() else []
 
 
 def families(ds: xr.Dataset, prefix: str) -> list[str]:

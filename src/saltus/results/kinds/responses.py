@@ -13,7 +13,14 @@ import xarray as xr
 
 from saltus.errors import counted
 from saltus.results.dataset.attractors import rows_as
-from saltus.results.dataset.kinds import LATE, OPEN, WITHOUT_WORDS, Kind, sentences
+from saltus.results.dataset.kinds import (
+    LATE,
+    LONGER_RESPONSE,
+    OPEN,
+    WITHOUT_WORDS,
+    Kind,
+    sentences,
+)
 from saltus.results.dataset.schema import (
     ResultKind,
     first_size,
@@ -89,7 +96,7 @@ def account(ds: xr.Dataset) -> list[str]:
     lines += [
         settled(labels),
         *families(ds, "response"),
-        *untyped(labels, Kind.UNCONVERGED, Kind.FAILED),
+        *untyped(labels, Kind.UNCONVERGED, Kind.FAILED, longer=LONGER_RESPONSE),
     ]
     return lines + [f"missed   {one}" for one in missed(starts, " at each")]
 

@@ -61,7 +61,7 @@ def test_chaos_has_no_long_period():
 
 
 @pytest.mark.parametrize(("period", "kind"), [(64, "UNCONVERGED"), (101, "LONG_PERIODIC")])
-@pytest.mark.parametrize("exponents", [{}, {0: (0.0, 1.0)}])
+@pytest.mark.parametrize("exponents", [{}, {0: ("not_repeating", 0.0, 1.0)}])
 def test_what_is_open_at_last_is_asked_whether_it_repeats_late(period, kind, exponents):
     @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
     def ring(t, x, v, *, w=1.0, rate=1 / 101):
