@@ -14,16 +14,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import Arc, both_sides, tangents
+from saltus.analysis.branches.arclength import both_sides, tangents
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.contact_sequences import ContactSequence, sequences
 from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.leg_arcs import LegWay, SequenceArc, follow_legs
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.piece import Piece
+from saltus.analysis.branches.resting_branches import resting_pieces
 from saltus.analysis.branches.sequence_changes import event_of
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.tracing import Plan, Start, both_ways
+from saltus.analysis.branches.tracing import Plan, Start
 
 
 @dataclass
@@ -41,27 +42,28 @@ class LegPiece(Piece):
 
 @dataclass
 class LegBranch(Branch):
-    """A branch in pieces of one contact sequence each. Its points are known with its events.
+    """A branch in pieces: of one contact sequence each, or of orbits that rest. Its points, and its
+    events, are known at last.
 
     Attributes
     ----------
-    parts : list of LegPiece or Event
+    parts : list of Piece or Event
         Its pieces in their order, and the grazes and corners between them.
     """
 
     orbits: PeriodicOrbits
-    parts: list[LegPiece | Event] = field(default_factory=list)
+    parts: list[Piece | Event] = field(default_factory=list)
 
     def find_events(self) -> None:
         """Locate what happens within the pieces, and join them."""
-        pieces = [part for part in self.parts if isinstance(part, LegPiece)]
+        pieces = [part for part in self.parts if isinstance(part, Piece)]
         for piece in pieces:
             piece.find_events()
         self.joined()
 
     def joined(self) -> LegBranch:
         """The branch with the points and events of its pieces."""
-        pieces = [part for part in self.parts if isinstance(part, LegPiece)]
+        pieces = [part for part in self.parts if isinstance(part, Piece)]
         self.z = np.concatenate([piece.by_points(piece.z) for piece in pieces])
         self.multipliers = np.concatenate([piece.multipliers for piece in pieces])
         steps = [np.append(0.0, np.diff(piece.length)) for piece in pieces]
@@ -112,30 +114,29 @@ def _leg_branch(plan: Plan, start: Start) -> Branch | None:
         return _branch(plan, orbits, sequence, start)
     if start.n > plan.longest:  # a chatter of many periods
         return None
-    flying = dict[int, np.ndarray]()
-
-    def flies(orbits: PeriodicOrbits, curve: Arc) -> str:
-        one = sequences(orbits, curve.z[-1][None])[0]
-        if one is None or not one.flies:
-            return ""
-        flying.setdefault(id(curve), curve.z[-1])
-        return "held"
-
-    (branch,) = both_ways(plan, [start], flies)
-    if branch is not None:
-        branch.ends = _where_held(orbits, branch)
-        branch.flying = list(flying.values())
+    pieces = resting_pieces(plan, start)
+    if not pieces:
+        return None
+    ends = _where_held(orbits, pieces)
+    if len(pieces) == 1:
+        pieces[0].ends = ends
+        return pieces[0]
+    none = np.zeros(0)
+    branch = LegBranch(orbits, 0, none, none, none, none, none, ends, parts=[*pieces])
+    branch.flying = pieces[0].flying
+    plan.watch.cut.pop(id(pieces[0]), None)
+    _keep(plan, branch)
     return branch
 
 
-def _where_held(orbits: PeriodicOrbits, branch: Branch) -> tuple[str, str]:
-    """Reasons for the two ends of a branch, with ``held`` for ``lost`` where contacts of the last
-    orbit are held.
+def _where_held(orbits: PeriodicOrbits, pieces: Sequence[Branch]) -> tuple[str, str]:
+    """Reasons for the two ends of a branch in pieces, with ``held`` for ``lost`` where contacts of
+    the last orbit are held.
     """
-    last = sequences(orbits, branch.z[[0, -1]])
+    last = sequences(orbits, np.array([pieces[0].z[0], pieces[-1].z[-1]]))
     begin, end = (
         "held" if why == "lost" and not (one is not None and one.flies) else why
-        for why, one in zip(branch.ends, last, strict=True)
+        for why, one in zip((pieces[0].ends[0], pieces[-1].ends[1]), last, strict=True)
     )
     return begin, end
 
@@ -183,13 +184,13 @@ def _joined(orbits: PeriodicOrbits, ways: list[LegWay]) -> LegBranch | None:
     return LegBranch(orbits, 0, none, none, none, none, none, ends, limits=limits, parts=parts)
 
 
-def _parts(ways: list[LegWay]) -> list[LegPiece | Event]:
+def _parts(ways: list[LegWay]) -> list[Piece | Event]:
     """Pieces and events of the ways ahead and back, in the order of the branch: the two arcs from
     the start are one piece.
     """
     arcs = [[arc for arc in way.arcs if arc.curve.z] for way in ways]
     ahead, back = arcs if len(arcs) > 1 else (arcs[0], [])
-    parts = list[LegPiece | Event]()
+    parts = list[Piece | Event]()
     for number, arc in reversed(list(enumerate(back))):
         parts += _passage(arc)
         if number or not ahead:

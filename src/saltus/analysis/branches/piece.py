@@ -84,6 +84,10 @@ class Piece:
         """Unit of each unknown."""
         return np.asarray(self.orbits.scale[self.row])
 
+    def by_points(self, z: np.ndarray) -> np.ndarray:
+        """Orbits float64[r, z] by their points."""
+        return z
+
     def find_events(self) -> None:
         """Locate the bifurcations; halve the intervals where stability doesn't add up."""
         for _ in range(DIVES):

@@ -50,15 +50,6 @@ def test_a_branch_ends_before_its_grazes_accumulate():
     assert found.sizes["point"] < 500
 
 
-def test_a_branch_that_is_lost_in_a_chatter_says_so():
-    """Where one of the impacts before the rest is grazed; resting on the stop it goes on at 0.2."""
-    chatter = sl.models.impact_oscillator("chatter")
-    vary = {"frequency": ("0.3 rad/s", "0.4 rad/s")}
-    found = sl.branches(chatter, vary, at=2, switch=(), progress=False)
-    assert "held" in {*found.branch_begin.values, *found.branch_end.values}
-    assert "the chatter before a held contact changes" in sl.describe(found)
-
-
 def test_a_branch_of_orbits_that_rest_ends_where_the_chatter_is_cut_short():
     """Beyond, each orbit flies: these are a branch of their own, back to where its grazes
     accumulate, one after the other.
@@ -71,9 +62,29 @@ def test_a_branch_of_orbits_that_rest_ends_where_the_chatter_is_cut_short():
     values, of = found.point_frequency.values, found.point_branch.values
     assert all(len(set(rests[of == branch])) == 1 for branch in range(found.sizes["branch"]))
     assert found.branch_end.values[of[np.argmax(np.where(rests, values, 0))]] == "held"
+    assert "the chatter before a held contact changes" in sl.describe(found)
     number = of[np.argmin(np.where(rests, 1, values))]
     assert found.branch_begin.values[number] == "accumulates"
     limit = found.branch_begin_limit.values[number]
     assert values[rests].max() < limit < values[~rests].min()
     assert values[~rests].min() - values[rests].max() < 1e-4
     assert found.branch_end.values[number] == "range"
+
+
+def test_a_branch_of_orbits_that_rest_passes_impacts_that_cross_the_whole_period():
+    """Points at whole periods jump there. Each orbit is reached from rest, too."""
+    chatter = sl.models.impact_oscillator("chatter", restitution=0.5)
+    found = sl.branches(
+        chatter, {"frequency": ("0.3 rad/s", "0.56 rad/s")}, at=2, switch=(), progress=False
+    )
+    assert (found.branch_begin.values, found.branch_end.values) == (["range"], ["range"])
+    values = found.point_frequency.values
+    assert np.diff(values).max() < 0.04
+    assert np.diff(values).min() > -1e-5
+    jumps = np.abs(np.diff(found.point_v.values[:, 0]))
+    assert (jumps > 0.05).sum() > 3
+    for i in range(0, len(values), 10):
+        system = chatter.with_values(frequency=float(values[i]))
+        run = sl.stroboscope(system, (0.0, 0.0), 60, keep=1, progress=False)
+        for name in ("x", "v"):
+            assert abs(run[name].values.ravel()[-1] - found[f"point_{name}"].values[i, 0]) < 1e-9
