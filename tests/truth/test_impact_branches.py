@@ -164,6 +164,24 @@ def test_of_alike_impacts_the_one_that_vanishes_may_be_any():
     assert (found.event_kind == "graze").sum() == 2
 
 
+@pytest.mark.slow
+def test_an_orbit_with_as_many_impacts_as_the_free_flow_but_others_is_none():
+    """In one flight it passed the stop, which the free flow meets there; both have eight."""
+    system = IMPACT("chatter", restitution=0.85)
+    found = sl.branches(system, {"frequency": (0.3, 1.2)}, at=1, switch=(), progress=False)
+    assert "lost" not in {*found.branch_begin.values, *found.branch_end.values}
+    calm = np.abs(found.point_multiplier_real.values).max(axis=1) < 10.0
+    impacts = found.point_contacts.values
+    assert len(set(impacts)) > 3
+    few = impacts < 10  # flights that a step of the other solver doesn't contain
+    for i in np.flatnonzero(calm & few & (found.point_frequency.values < 0.4))[::2]:
+        frequency = float(found.point_frequency[i])
+        start = [float(found[f"point_{name}"].values[i, 0]) for name in ("x", "v")]
+        end, count = flown(start, frequency, stop=0.2, kept=0.85)
+        assert count == impacts[i]
+        np.testing.assert_allclose(end, start, atol=1e-7)
+
+
 def flown(state, frequency, stop=1.0, kept=0.8):
     """The state after a forcing period, and the impacts on the way."""
 

@@ -120,10 +120,10 @@ def _reported_before(
     return reported
 
 
-def shift(one: ContactSequence, other: ContactSequence, n: int) -> int | None:
+def shift(one: ContactSequence, other: ContactSequence, n: int, apart: float = 0.5) -> int | None:
     """By how many places the contacts of a neighbouring orbit of n periods are shifted to be the
     same ones: other than 0 where contacts have crossed the whole period at which the orbits begin.
-    None if the sequences differ.
+    None if the sequences differ, or a contact comes earlier or later by ``apart`` times n periods.
     """
     m = len(one.contacts)
     if m != len(other.contacts):
@@ -136,7 +136,7 @@ def shift(one: ContactSequence, other: ContactSequence, n: int) -> int | None:
             _alike(mine, other.contacts[j % m]) for mine, j in zip(one.contacts, order, strict=True)
         ):
             there = other.phase[order % m] + n * (order // m)
-            if np.abs(there - one.phase).max() < 0.5 * n:
+            if np.abs(there - one.phase).max() < apart * n:
                 return by
     return None
 

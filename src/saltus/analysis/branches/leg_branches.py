@@ -124,7 +124,8 @@ def _leg_branch(plan: Plan, start: Start) -> Branch | None:
     none = np.zeros(0)
     branch = LegBranch(orbits, 0, none, none, none, none, none, ends, parts=[*pieces])
     branch.flying = pieces[0].flying
-    plan.watch.cut.pop(id(pieces[0]), None)
+    for piece in pieces:
+        plan.watch.cut.pop(id(piece), None)
     _keep(plan, branch)
     return branch
 

@@ -25,6 +25,9 @@ from saltus.kernels import status as st
 
 #: Shorter times are rounding, in periods.
 AT_ONCE = 1e-14
+#: Contacts of an orbit that the free flow meets earlier or later by this share of its time are
+#: others: as many, but not these. What rounding moves beside a graze is a thousandth of it.
+FREE = 1e-3
 
 
 class Legs:
@@ -380,7 +383,7 @@ class Legs:
                 self.sequence.velocity,
                 self.sequence.mode,
             )
-            result[i] = free is not None and shift(sequence, free, self.n) is not None
+            result[i] = free is not None and shift(sequence, free, self.n, FREE) is not None
         return result
 
     def free_flow(self, z: np.ndarray) -> list[ContactSequence | None]:

@@ -34,6 +34,8 @@ ASTRAY = 0.1
 PHASE, SPEED = 0.02, 0.1
 #: Impacts passed in one direction, at most.
 MOST_PASSED = 40
+#: Fewest points for which a piece is begun.
+LEAST = 4
 
 
 def resting_pieces(plan: Plan, start: Start) -> list[Branch]:
@@ -56,7 +58,11 @@ def resting_pieces(plan: Plan, start: Start) -> list[Branch]:
     pieces = [first]
     for last in (-1, 0) if not first.closed else ():
         for _ in range(MOST_PASSED):
-            piece = _behind(plan, start, pieces[last], last, flies)
+            left = 2 * plan.points - sum(len(one.z) for one in pieces)
+            if left < LEAST:
+                break
+            some = replace(plan, points=min(left, plan.points))
+            piece = _behind(some, start, pieces[last], last, flies)
             if piece is None:
                 break
             pieces.insert(len(pieces) if last else 0, piece)
@@ -84,8 +90,11 @@ def _behind(
     (found,) = both_ways(plan, [replace(start, seed=seed, z=z)], flies)
     if found is None:
         return None
-    plan.watch.cut.pop(id(found), None)
-    return found if last else _reversed(found)
+    if last:
+        return found
+    piece = _reversed(found)
+    plan.watch.cut[id(piece)] = plan.watch.cut.pop(id(found), found)
+    return piece
 
 
 def _reversed(branch: Branch) -> Branch:
