@@ -344,7 +344,8 @@ def _classify_aperiodic(
     map_: Stroboscope, who: np.ndarray, most: int, result: SettledMotions, past: np.ndarray
 ) -> tuple[np.ndarray, dict[int, tuple[str, float, float]]]:
     """Classify trajectories that don't recur by their exponents; writes what is known, returns
-    those that stay unclear, and the exponents, with their errors, that don't say what a motion is.
+    those that stay unclear, and, of those among them that don't repeat, or are chaotic but nearly
+    recur, the kind, the exponent and its error.
     ``past``: their last iterates, float64[k, KEPT_ITERATES, D].
     """
     maps, groups, start = map_.rows(who), [[i] for i in range(len(who))], result.end[who]

@@ -150,7 +150,8 @@ def branches(
         ``point_eigenvalue_real`` and ``_imag`` [1/s] in place of multipliers and a period),
         ``branch_periods``, ``branch_closed``, ``branch_parent``, ``branch_begin``, ``branch_end``
         (``accumulates``: its grazes do, at ``branch_begin_limit`` or ``branch_end_limit``;
-        ``held``: the chatter before a held contact changes, which isn't followed),
+        ``held``: the chatter before a held contact is cut short, and orbits beyond are another
+        branch),
         ``branch_twin``: whether its mirror image, in symmetric equations, is a branch of its own,
         which isn't listed. On event: ``event_kind`` (``fold``, ``period_doubling``,
         ``branch_point``, ``neimark_sacker``; ``hopf`` and ``boundary_equilibrium`` of equilibria;

@@ -40,8 +40,8 @@ LEAST = 4
 
 def resting_pieces(plan: Plan, start: Start) -> list[Branch]:
     """The branch of a start in pieces, in their order, from one impact that crosses the whole
-    period to the next; it ends with ``held`` where its contacts are held no more, or aren't found
-    to be.
+    period to the next. It ends with ``held`` where its contacts are held no more; with ``points``
+    where more impacts, or points, would follow than are asked for.
     """
     flying = dict[int, np.ndarray]()
 
@@ -57,9 +57,10 @@ def resting_pieces(plan: Plan, start: Start) -> list[Branch]:
         return []
     pieces = [first]
     for last in (-1, 0) if not first.closed else ():
-        for _ in range(MOST_PASSED):
+        for passed in range(MOST_PASSED + 1):
             left = 2 * plan.points - sum(len(one.z) for one in pieces)
-            if left < LEAST:
+            if left < LEAST or passed == MOST_PASSED:
+                _cut(pieces[last], last)
                 break
             some = replace(plan, points=min(left, plan.points))
             piece = _behind(some, start, pieces[last], last, flies)
@@ -68,6 +69,12 @@ def resting_pieces(plan: Plan, start: Start) -> list[Branch]:
             pieces.insert(len(pieces) if last else 0, piece)
     pieces[0].flying = list(flying.values())
     return pieces
+
+
+def _cut(piece: Branch, last: int) -> None:
+    """End a piece that is lost with ``points``: no more are to be followed."""
+    begin, end = ("points" if why == "lost" else why for why in piece.ends)
+    piece.ends = (piece.ends[0], end) if last else (begin, piece.ends[1])
 
 
 def _behind(
