@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 import saltus as sl
+from saltus.errors import ParameterError
 
 #: Times in a flight between which the stop is looked for, in periods: bounces may be short.
 GRID = np.concatenate([[0.0], np.geomspace(1e-7, 1.0, 800)])
@@ -67,7 +68,7 @@ def checked(seed):
     band = (low, low * rng.uniform(1.2, 2.0))
     try:
         found = sl.branches(stop, {"frequency": band}, at=2, points=200, progress=False)
-    except sl.ParameterError:  # no start settles to an orbit
+    except ParameterError:  # no start settles to an orbit
         return 0
     along, of = found.point_frequency.values, found.point_branch.values
     assert band[0] * (1 - 1e-12) <= along.min() <= along.max() <= band[1] * (1 + 1e-12)
