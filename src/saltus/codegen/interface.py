@@ -25,7 +25,8 @@ class Interface:
     entry : str
         The one function that is called from outside.
     arguments : tuple of str
-        Numba types of its arguments.
+        Numba types of its arguments. ``float64[:, 4]`` is an array of four columns: the compiler
+        knows them, so that it finds its rows without a product.
     layout : str
         The template that says what the work arrays hold, by the sizes alone; "" if there are none.
     templates : tuple of str
@@ -234,11 +235,21 @@ BALANCE = Interface(
     truths=(),
 )  # fmt: skip
 
+#: Lanes of the modal flow and of the search for the turns of waves: they hold modes.
+MODE_LANES = 4
+_ROWS = f"float64[:, {MODE_LANES}]"
 _MODAL_TABLES = (
-    *(_I1, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2, _F2, _F2),
-    *(_I2, _F2, _F2, _I1, _F2, _F2),
+    *(_I1, _I1, _F1, _F2, _F2, _F2, _ROWS, _ROWS, _I2, _F2, _ROWS),
+    *("int64[:, 6]", _F2, _F2, _I1, _ROWS, _F2),
 )
-_MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 15 + (_F1, _F2, _I1, _F2)
+#: Types of the work arrays, by lines as kernels/modal/layout.py names them.
+_MODAL_WORK = (
+    *(_ROWS, _ROWS, _ROWS, _ROWS, "float64[:, 24]", "float64[:, 4]"),
+    *(_F1, "float64[:, 16]", "float64[:, 2]", _F1, _F1, "float64[:, 2]", _ROWS),
+    *(_ROWS, "float64[:, 6]", "float64[:, 10]", _ROWS, _F2, _ROWS),
+    *(_ROWS, _F2, _F2, _ROWS, "float64[:, 4]", _ROWS, "float64[:, 11]", _F1),
+    *(_ROWS, _I1, _ROWS),
+)
 
 #: The modal flow: what it needs of an equation are tables, which it is given.
 MODAL = Interface(
@@ -281,3 +292,29 @@ WAVES = Interface(
     functions=MappingProxyType({}),
     truths=(),
 )
+
+
+def numba_type(kind: str) -> str:
+    """The Numba type of an argument, such as ``float64[:, ::1]`` of ``float64[:, 4]``."""
+    return kind if columns_of(kind) is None else f"{kind[: kind.rindex(',')]}, ::1]"
+
+
+def columns_of(kind: str) -> int | None:
+    """Columns of an argument, if they are known: 4 of ``float64[:, 4]``."""
+    last = kind.rpartition(",")[2].strip(" ]")
+    return int(last) if last.isdigit() else None
+
+
+def known_of_argument(kind: str) -> list[int | None]:
+    """The numbers that Numba passes for an argument as far as they are known, None for others: of
+    an array no owner, no parent, its size, the size of a number [bytes], its address, its shape,
+    its strides [bytes].
+    """
+    if "[" not in kind:
+        return [None]
+    axes, columns = kind.count(",") + 1, columns_of(kind)
+    strides: list[int | None] = [None] * axes
+    strides[-1] = 8
+    if columns is not None:
+        strides[-2] = 8 * columns
+    return [0, 0, None, 8, None, *([None] * (axes - 1)), columns, *strides]

@@ -29,7 +29,7 @@ from saltus import cache
 from saltus.codegen import machine, templates
 from saltus.codegen.building import BuildOrder, built, built_to_keep
 from saltus.codegen.head import Constant, Head
-from saltus.codegen.interface import BATCH, Interface
+from saltus.codegen.interface import BATCH, Interface, columns_of
 from saltus.codegen.lane_ir import constants_ir, equation_ir
 
 GENERIC, FULL = TIERS = ("generic", "full")
@@ -54,10 +54,11 @@ _beginning: Callable[[Any], Any] = ctypes.c_char.from_buffer
 _place: Callable[[Any], int] = ctypes.addressof
 
 
-def _refused(array: np.ndarray, dtype: np.dtype, axes: int) -> TypeError:
+def _refused(array: np.ndarray, dtype: np.dtype, axes: int, columns: int | None) -> TypeError:
+    known = "" if columns is None else f" and {columns} columns"
     return TypeError(
         f"a kernel takes a contiguous array of {dtype} with {axes} "
-        f"axes, not of {array.dtype} {array.shape}."
+        f"axes{known}, not of {array.dtype} {array.shape}."
     )
 
 
@@ -68,12 +69,16 @@ class Call:
 
     def __init__(self, arguments: tuple[str, ...]) -> None:
         self._kinds = [
-            (None if kind == "int64" else _DTYPES[kind.partition("[")[0]], kind.count(",") + 1)
+            (
+                None if kind == "int64" else _DTYPES[kind.partition("[")[0]],
+                kind.count(",") + 1,
+                columns_of(kind),
+            )
             for kind in arguments
         ]
         # for each argument the number that its shape doesn't contain: its value, or its address
         places, used = [], 0
-        for dtype, axes in self._kinds:
+        for dtype, axes, _ in self._kinds:
             places.append(used if dtype is None else used + 4)
             used += 1 if dtype is None else 5 + 2 * axes
         self._places = np.array(places, np.int64)
@@ -88,17 +93,21 @@ class Call:
         Raises
         ------
         TypeError
-            If an array isn't of its type, or isn't contiguous.
+            If an array isn't of its type, has other columns, or isn't contiguous.
         """
         numbers, shapes = [], []
-        for value, (dtype, axes) in zip(values, self._kinds, strict=True):
+        for value, (dtype, axes, columns) in zip(values, self._kinds, strict=True):
             if dtype is None:
                 numbers.append(int(value))
                 continue
             shape = value.shape
             own = value.dtype
-            if (own is not dtype and own != dtype) or len(shape) != axes:
-                raise _refused(value, dtype, axes)
+            if (
+                (own is not dtype and own != dtype)
+                or len(shape) != axes
+                or (columns is not None and shape[-1] != columns)
+            ):
+                raise _refused(value, dtype, axes, columns)
             shapes.append(shape)
             if 0 in shape:
                 numbers.append(0)
@@ -107,7 +116,7 @@ class Call:
                 numbers.append(_place(_beginning(value)))
             except TypeError:  # it is read-only, or not contiguous
                 if not value.flags.c_contiguous:
-                    raise _refused(value, dtype, axes) from None
+                    raise _refused(value, dtype, axes, columns) from None
                 numbers.append(int(value.ctypes.data))
         block = self._shaped(tuple(shapes)).copy()
         block[self._places] = numbers
@@ -117,7 +126,7 @@ class Call:
         """The block for arrays of some shapes, without their addresses."""
         numbers: list[int] = []
         given = iter(shapes)
-        for dtype, _ in self._kinds:
+        for dtype, *_ in self._kinds:
             if dtype is None:
                 numbers.append(0)
             else:

@@ -21,6 +21,7 @@ from saltus.codegen.interface import (
     FIXED_STEP,
     HARMONICS,
     MODAL,
+    MODE_LANES,
     NDF,
     PAIR,
     TAYLOR,
@@ -35,13 +36,13 @@ WIDTHS = (2, 4, 8, 16)
 BITCODE: dict[str, tuple[Interface, int]] = {
     **{f"taylor_{lanes}": (TAYLOR, lanes) for lanes in WIDTHS}, "pair": (PAIR, 1),
     "fixed_step": (FIXED_STEP, 1), "adams": (ADAMS, 1), "ndf": (NDF, 1), "capture": (CAPTURE, 1),
-    "harmonics": (HARMONICS, 1), "balance": (BALANCE, 1), "modal": (MODAL, 4),
-    "waves": (WAVES, 4),
+    "harmonics": (HARMONICS, 1), "balance": (BALANCE, 1), "modal": (MODAL, MODE_LANES),
+    "waves": (WAVES, MODE_LANES),
 }  # fmt: skip
 #: Kernels that the templates import.
 _SHARED = ("lanes", "trigonometry", "isolation", "status", "batch", "parts", "clocks_layout")
 #: Raised when codegen/lowering makes other bitcode of the same templates.
-BITCODE_VERSION = 2
+BITCODE_VERSION = 3
 
 
 @cache

@@ -6,8 +6,10 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -143,6 +145,15 @@ def test_the_bitcode_is_current(name):
     """Templates were edited? python -m saltus.codegen.lowering"""
     assert templates.is_current(name)
     assert templates.bitcode(name)[:2] == b"BC"
+
+
+def test_functions_that_the_compiler_treats_apart_exist():
+    """One that was renamed would be optimised like all others, without a word."""
+    from saltus.codegen.lowering import bitcode as lowering
+
+    files = Path(templates.__file__).parents[1].joinpath("kernels").rglob("*.py")
+    defined = {name for file in files for name in re.findall(r"^def (\w+)", file.read_text(), re.M)}
+    assert defined >= lowering.COLD | lowering.NOINLINE | lowering._BY_COST_MODEL
 
 
 def made_again(name):

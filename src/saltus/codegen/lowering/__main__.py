@@ -27,9 +27,8 @@ def made(name: str) -> tuple[bytes, dict]:
 
     interface, lanes = templates.BITCODE[name]
     module, entry, inlined = frontend.module_of(interface, lanes)
-    data = lzma.compress(
-        bitcode(module, entry, f"saltus_{interface.entry}", inlined), preset=9 | lzma.PRESET_EXTREME
-    )
+    code = bitcode(module, entry, f"saltus_{interface.entry}", inlined, interface.arguments)
+    data = lzma.compress(code, preset=9 | lzma.PRESET_EXTREME)
     return data, {
         "sources": templates.source_hash(name),
         "texts": templates.text_hash(name),

@@ -8,8 +8,10 @@ import re
 
 import llvmlite.binding as llvm
 
-#: Functions that run only at breaks of time, touches, starts and ends: LLVM doesn't optimise them,
-#: which saves a quarter of its time.
+from saltus.codegen.interface import known_of_argument
+
+#: Functions that run only at breaks of time, touches, starts and ends, in every template that has
+#: one of the name: LLVM doesn't optimise them, which saves a quarter of its time.
 COLD = {
     "place_clocks", "set_clocks", "follow_clocks", "first_guess", "begin_of", "hold_piece",
     "hold_polynomial", "on_from_to", "knots",
@@ -18,7 +20,7 @@ COLD = {
     "note_touch", "note_touches", "is_exact_zero", "final_contacts", "start_sides", "fill", "empty",
     "refill", "set_period", "is_broken",
     "record", "saltate", "overflowed", "end_stretch", "is_slow", "periods_behind", "write_samples",
-    "take_impacts", "order_matters", "end_impacts", "begins_uniquely",
+    "take_impacts", "end_impacts", "begins_uniquely",
 }  # fmt: skip
 #: Functions of lanes that few equations or structures need: never inlined, to keep them out of the
 #: others.
@@ -32,7 +34,9 @@ _BY_COST_MODEL = {"attend", "change_side", "land_all"}
 _MANGLED = re.compile(r"_ZN8template(\d+)(\w+)")
 
 
-def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) -> bytes:
+def bitcode(
+    module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str], arguments: tuple[str, ...]
+) -> bytes:
     """The bitcode of a module with one function to be called, ``i64 symbol(ptr values)``.
 
     Parameters
@@ -46,6 +50,8 @@ def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) 
         that it is given.
     inlined : set of str
         Functions that are to be inlined, by the names that they have in the templates.
+    arguments : tuple of str
+        Types of the arguments, as :class:`saltus.codegen.interface.Interface` has them.
     """
     names = _names(module, symbol)
     # Numba passes it from callers to callees; kernels raise nothing
@@ -53,7 +59,8 @@ def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) 
     text = re.sub(
         r'@("[^"]+"|[\w.$]+)', lambda name: f"@{names.get(name[1].strip(chr(34)), name[1])}", text
     )
-    clean = llvm.parse_assembly(text + _caller(module.get_function(entry), symbol, names[entry]))
+    caller = _caller(module.get_function(entry), symbol, names[entry], arguments)
+    clean = llvm.parse_assembly(text + caller)
     for function in clean.functions:
         if not function.is_declaration:
             function.linkage = "external" if function.name == symbol else "internal"
@@ -90,19 +97,22 @@ def _names(module: llvm.ModuleRef, symbol: str) -> dict[str, str]:
     return names
 
 
-def _caller(function: llvm.ValueRef, symbol: str, name: str) -> str:
+def _caller(function: llvm.ValueRef, symbol: str, name: str, arguments: tuple[str, ...]) -> str:
     """Write ``i64 symbol(ptr values)``: it calls a function of Numba's with arguments one after the
-    other in memory; -1 if that fails.
+    other in memory, of which those that are known are numbers; -1 if that fails.
     """
     # its result, an exception, and its arguments
     kinds = [str(argument.type) for argument in function.arguments][2:]
-    lines = ["%result = alloca i64", "%raised = alloca ptr"]
-    for i, kind in enumerate(kinds):
-        lines += [
-            f"%p{i} = getelementptr i64, ptr %values, i64 {i}",
-            f"%a{i} = load {kind}, ptr %p{i}",
-        ]
-    given = "".join(f", {kind} %a{i}" for i, kind in enumerate(kinds))
+    known = [number for kind in arguments for number in known_of_argument(kind)]
+    lines, given = ["%result = alloca i64", "%raised = alloca ptr"], ""
+    for i, (kind, number) in enumerate(zip(kinds, known, strict=True)):
+        if number is None:
+            lines += [
+                f"%p{i} = getelementptr i64, ptr %values, i64 {i}",
+                f"%a{i} = load {kind}, ptr %p{i}",
+            ]
+        value = "null" if kind == "ptr" else number
+        given += f", {kind} {f'%a{i}' if number is None else value}"
     lines += [
         f"%code = call i32 @{name}(ptr %result, ptr %raised{given})",
         "%value = load i64, ptr %result",

@@ -16,7 +16,7 @@ from numba import njit
 from numba.core import codegen
 from numba.core.compiler_lock import global_compiler_lock
 
-from saltus.codegen.interface import Interface
+from saltus.codegen.interface import Interface, numba_type
 from saltus.codegen.lowering import lane_types, open_names  # noqa: F401  (lane_types: registers its types)
 from saltus.codegen.templates import open_names_of, text
 from saltus.kernels import batch, clocks_layout, lanes, parts, status
@@ -68,7 +68,7 @@ class _Space:
     def __init__(self, arguments: tuple[str, ...]) -> None:
         marks = {
             "kernel": njit(**_OPTIONS), "inner": njit(forceinline=True, **_OPTIONS),
-            "entry": njit(f"int64({', '.join(arguments)})", **_OPTIONS),
+            "entry": njit(f"int64({', '.join(map(numba_type, arguments))})", **_OPTIONS),
         }  # fmt: skip
         operations = {name: value for name, value in vars(lanes).items() if callable(value)}
         self.names: dict[str, Any] = {

@@ -550,7 +550,7 @@ def look(i, tau, h, modes, steady, batch, m):
         if (crossing >> g) & 1:
             d = m.found[g, PLACE] * h
             if m.found[g, FINAL] == 0.0:
-                d = place_of(i, g, tau, h, modes, steady, batch, m)
+                d = crossing_of(i, g, tau, h, modes, steady, batch, m)
             together = abs(d - first) <= COINCIDENT * (batch.origin[i] + tau)
             if hits != 0 and together:
                 hits |= 1 << g

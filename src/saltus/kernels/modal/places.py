@@ -1,7 +1,6 @@
 """Template of the modal flow: the place at which a gap crosses, by Newton's method on the modes."""
 
-from saltus.kernels.isolation import polynomial, slope
-from saltus.kernels.lanes import fma, load, splat, store
+from saltus.kernels.lanes import fma, load, load_at, splat, store
 
 
 @kernel
@@ -9,26 +8,49 @@ def about(g, r, sign, away, m):
     """Part of the step at which a gap crosses in its bracket, roughly: by a few steps of Newton's
     method on the polynomial of both ends.
     """
-    rows, first = (ORDER + 1) // LANES, POWERS
-    for i in range(rows // 2, rows):
+    rows, half = (ORDER + 1) // LANES, HALF // LANES
+    for i in range(half):
+        store(m.sums, i, load_at(m.q, r, LANES * i, LANES))
+    for i in range(half, rows):
         a = splat(0.0, LANES)
         for k in range(ORDER + 1):
             value = m.q[r, k if k < HALF else HALF + k]
-            a = fma(load(m.bernstein, first + k * rows + i, LANES), value, a)
+            a = fma(load(m.bernstein, POWERS + k * rows + i, LANES), value, a)
         store(m.sums, i, a)
-    for k in range(ORDER + 1):
-        m.p[k] = sign * (m.q[r, k] if k < HALF else number(m.sums, 0, k))
-    m.p[0] += away
     x, low, high = m.found[g, PLACE], m.found[g, BEGINS], m.found[g, BRACKET]
     for _ in range(3):
-        rate = slope(m.p, ORDER, x)
-        x = x - polynomial(m.p, ORDER, x) / rate if rate != 0.0 else x
+        value, rate = value_and_slope(x, m)
+        value = sign * value + away
+        x = x - value / (sign * rate) if rate != 0.0 else x
         x = min(max(x, low), high)
     return x
 
 
+@inner
+def value_and_slope(x, m):
+    """Value and derivative of a polynomial whose coefficients stand in `sums`, in the order of the
+    powers: polynomials of x^LANES, a lane for each power of x below that, side by side.
+    """
+    square = x * x
+    power = square * square
+    a = load(m.sums, (ORDER + 1) // LANES - 1, LANES)
+    b = splat(0.0, LANES)
+    for i in range((ORDER + 1) // LANES - 2, -1, -1):
+        b = fma(b, power, a)
+        a = fma(a, power, load(m.sums, i, LANES))
+    store(m.sums, ORDER + 1, a)
+    store(m.sums, ORDER + 2, b)
+    p, q = number(m.sums, ORDER + 1, 0), number(m.sums, ORDER + 1, 1)
+    r, s = number(m.sums, ORDER + 1, 2), number(m.sums, ORDER + 1, 3)
+    value = (p + q * x) + square * (r + s * x)
+    rate = (q + 2.0 * r * x) + 3.0 * s * square
+    p, q = number(m.sums, ORDER + 2, 0), number(m.sums, ORDER + 2, 1)
+    r, s = number(m.sums, ORDER + 2, 2), number(m.sums, ORDER + 2, 3)
+    return value, rate + 4.0 * x * square * ((p + q * x) + square * (r + s * x))
+
+
 @kernel
-def place_of(i, g, tau, h, modes, steady, batch, m):
+def crossing_of(i, g, tau, h, modes, steady, batch, m):
     """Time after tau at which a gap that falls all the way crosses, by Newton's method on the modes
     inside a shrinking bracket: each step goes to a zero of the terms up to the fourth.
     """

@@ -37,12 +37,18 @@ def begin_period(i, batch, m):
 
 @kernel
 def drive(i, tau, batch, m):
-    """Cosine and sine of each drive at a time of the period, to `angle`; the courses there."""
+    """Cosine and sine of each drive at a time of the period, to `angle`; the courses there. Uses
+    `sums`.
+    """
     which = int(batch.carry[i, SET])
     for d in range(m.sizes[DRIVES]):
         if m.angle[d, 3] != tau:
             at = m.angle[d, 0] + m.rate[which, d] * tau
-            m.angle[d, 1], m.angle[d, 2], m.angle[d, 3] = math.cos(at), math.sin(at), tau
+            sine, cosine = sincos(splat(at, LANES))
+            store(m.sums, 0, cosine)
+            store(m.sums, 1, sine)
+            m.angle[d, 1], m.angle[d, 2] = m.sums[0, 0], m.sums[1, 0]
+            m.angle[d, 3] = tau
     courses_at(tau, m)
 
 
