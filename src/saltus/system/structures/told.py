@@ -138,10 +138,11 @@ def _moved(label: str, mass: Any, kept: Modes, moved: np.ndarray, unit: str) -> 
 
 
 def _frequencies(angular: np.ndarray) -> str:
-    """The lowest natural frequencies, as the end of a sentence."""
+    """The lowest natural frequencies, as the end of a sentence: 0 of rigid bodies."""
     if not len(angular):
         return ""
-    lowest = ", ".join(f"{one:.4g}" for one in angular[:_TOLD] / (2 * math.pi))
+    known = np.where(angular > RIGID * angular.max(), angular, 0.0) / (2 * math.pi)
+    lowest = ", ".join(f"{one:.4g}" for one in known[:_TOLD])
     return f"; natural frequencies {lowest}{', ...' if len(angular) > _TOLD else ''} Hz"
 
 

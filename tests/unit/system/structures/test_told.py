@@ -82,6 +82,16 @@ def test_rigid_bodies_move_and_are_no_error(size):
     assert ("isn't known: a rigid body moves there" in made.description) == (size > 1500)
 
 
+@pytest.mark.parametrize("size", range(4, 14))
+def test_the_frequency_of_a_rigid_body_is_said_without_rounding(size):
+    """Also where all degrees of freedom are kept, whose eigenvalues are those of no reduction: half
+    of them are rounded to more than zero.
+    """
+    free = 1e4 * (2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1))
+    free[0, 0] = free[-1, -1] = 1e4
+    assert "natural frequencies 0, " in sl.structure(np.eye(size), free).description
+
+
 @pytest.mark.parametrize(("factor", "told"), [(1e-12, "kg and N/m"), (1e14, "kg and N/m")])
 def test_wrong_units_are_doubted(factor, told):
     with pytest.warns(SaltusWarning, match=told):
