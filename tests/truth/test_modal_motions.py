@@ -263,9 +263,11 @@ def test_random_structures(seed):
 
 
 def test_the_largest_exponents_alone_are_those_of_all():
-    """Three directions are carried in place of twelve, from other ones at the start."""
+    """Three directions are carried in place of twelve, from other ones at the start. 800 periods
+    leave no doubt about the first one: of 100 it was as large as three errors.
+    """
     beam = chain(6, gap=0.02).with_values(first_stiffness=2e4, last_stiffness=2e4)
-    kw = {"periods": 100, "transient": 150, "progress": False}
+    kw = {"periods": 800, "transient": 150, "progress": False}
     every, some = (sl.lyapunov(beam, exponents=most, **kw) for most in (None, 3))
     assert every.kind.item() == some.kind.item() == "chaotic"
     apart = np.abs(some.lyapunov_exponent.values - every.lyapunov_exponent.values[:, :3])

@@ -17,8 +17,9 @@ SHARED = 32
 def modes_rows(
     matrix: np.ndarray, modes: StateModes, gaps: np.ndarray, groups: int, state_groups: int
 ) -> np.ndarray:
-    """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; where L and V aren't
-    zero; the groups of modes in use; the block.
+    """The table of some modes: lambda, its size, L, V, amplitudes of the gaps, their sizes, and
+    those of the terms of which they are sums; where L and V aren't zero; the groups of modes in
+    use; the block.
 
     Parameters
     ----------
@@ -52,7 +53,8 @@ def modes_rows(
         left = shapes_table(*shared, to_states, LANES, left.size)
         right = np.zeros(right.shape)
     rows = gaps @ to_states[:states]
-    waves = np.stack([rows.real, rows.imag, np.abs(rows)], axis=1)
+    terms = np.abs(gaps) @ np.abs(to_states[:states])
+    waves = np.stack([rows.real, rows.imag, np.abs(rows), terms], axis=1)
     block = table_of(modes.block, slots if shared else 0, gaps, LANES, state_groups)
     sides = (
         (to_modes, groups, state_groups),
@@ -103,7 +105,9 @@ def shapes_table(
     return np.concatenate([flat, np.zeros(size - len(flat))])
 
 
-def steady_rows(answers: np.ndarray, gaps: np.ndarray, harmonic: int, width: int) -> np.ndarray:
+def steady_rows(
+    answers: np.ndarray, gaps: np.ndarray, sizes: np.ndarray, harmonic: int, width: int
+) -> np.ndarray:
     """Rows of the table of steady answers, contact state by contact state, float64[k, ..].
 
     Parameters
@@ -111,6 +115,8 @@ def steady_rows(answers: np.ndarray, gaps: np.ndarray, harmonic: int, width: int
     answers, gaps : complex128[k, N, ..], complex128[k, R, ..]
         Of the states, and of the gaps; the first ``harmonic`` of them have an imaginary part, but
         for that to the constant.
+    sizes : float64[k, R, ..]
+        Of the terms of which the answers of the gaps are sums.
     harmonic, width : int
         How many; numbers that the states take with those that fill the lanes.
     """
@@ -118,9 +124,14 @@ def steady_rows(answers: np.ndarray, gaps: np.ndarray, harmonic: int, width: int
     terms = [(0, "real")]
     terms += [(d, part) for d in range(1, harmonic) for part in ("real", "imag")]
     terms += [(d, "real") for d in range(harmonic, columns)]
-    first, count = width * len(terms), len(terms) * gaps.shape[1]
+    each = len(terms) + 1 + columns - harmonic
+    first, count = width * len(terms), each * gaps.shape[1]
     rows = np.zeros((len(answers), first + count + -count % LANES))
     for k, (d, part) in enumerate(terms):
         rows[:, width * k : width * k + states] = getattr(answers[:, :, d], part)
-        rows[:, first + k : first + count : len(terms)] = getattr(gaps[:, :, d], part)
+        rows[:, first + k : first + count : each] = getattr(gaps[:, :, d], part)
+    rows[:, first + len(terms) : first + count : each] = sizes[:, :, :harmonic].sum(axis=2)
+    for k in range(harmonic, columns):
+        place = first + len(terms) + 1 + k - harmonic
+        rows[:, place : first + count : each] = sizes[:, :, k]
     return rows

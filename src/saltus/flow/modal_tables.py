@@ -400,11 +400,13 @@ class Tables:
         each course.
         """
         harmonic, first = 1 + len(given.rates), self.first_guard
-        gaps = shown.matrix[first] @ answers
-        gaps[:, :, 0] += (shown.constant - given.gaps.constant)[first]
-        gaps[:, :, 1:harmonic] += shown.driven[first, : harmonic - 1]
-        gaps[:, :, harmonic :: self.linear.terms] += shown.driven[first, harmonic - 1 :]
-        rows = steady_rows(answers, gaps, harmonic, LANES * self.state_groups)
+        own = np.zeros((len(first), answers.shape[2]))
+        own[:, 0] = (shown.constant - given.gaps.constant)[first]
+        own[:, 1:harmonic] = shown.driven[first, : harmonic - 1]
+        own[:, harmonic :: self.linear.terms] = shown.driven[first, harmonic - 1 :]
+        gaps, parts = shown.matrix[first] @ answers + own, np.abs(answers.real)
+        sizes = np.abs(shown.matrix[first]) @ (parts + np.abs(answers.imag)) + np.abs(own)
+        rows = steady_rows(answers, gaps, sizes, harmonic, LANES * self.state_groups)
         each = rows.shape[1] // LANES
         firsts: np.ndarray = self.steady.add(rows) + each * np.arange(len(rows))
         return firsts

@@ -44,7 +44,7 @@ def stand(modes, steady, which, m):
     for r in range(m.sizes[GAP_ROWS]):
         row, at = waves_of(r, modes, m), first_wave(r, m)
         value, rate, fifth = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
-        size, speed = splat(0.0, LANES), splat(0.0, LANES)
+        size, speed, terms = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
         store(m.waves, at + WAVES * used + BEYOND, size)
         store(m.waves, at + WAVES * used + FASTER, speed)
         for g in range(used - 1, -1, -1):
@@ -61,11 +61,14 @@ def stand(modes, steady, which, m):
             value, rate = value + real, rate + going
             size, speed, square = size + bound, fma(bound, fast, speed), fast * fast
             fifth = fma(bound * fast, square * square, fifth)
+            weight = load(m.modes, row + 3 * groups + g, LANES)
+            terms = fma(load(m.size, g, LANES), weight, terms)
             store(m.waves, at + WAVES * g + BEYOND, size)
             store(m.waves, at + WAVES * g + FASTER, speed)
         store(m.sums, 0, value)
         store(m.sums, 1, rate)
         store(m.sums, 2, fifth)
+        store(m.sums, 3, terms)
         add_block_gap(r, modes, m.y, m)
         stand_row(r, steady, which, m)
 
@@ -76,10 +79,9 @@ def stand_row(r, steady, which, m):
     value, rate, fifth = total_of(m.sums, 0), total_of(m.sums, 1), total_of(m.sums, 2)
     first, at = numbers_of_gap(r, steady, m)
     more, faster = steady_gap(first, at, which, m)
-    size = total_of(m.waves, first_wave(r, m) + BEYOND) + abs(number(m.steady, first, at))
+    size = total_of(m.sums, 3) + number(m.steady, first, sizes_of_gap(at, m))
     for d in range(m.sizes[DRIVES]):
         a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
-        size += abs(a) + abs(b)
         fifth += (abs(a) + abs(b)) * abs(m.rate[which, d]) ** 5
     m.stood[r, HERE], m.stood[r, SLOPE] = value + more, rate + faster
     m.stood[r, SIZE], m.stood[r, FIFTH] = size, fifth
@@ -89,7 +91,7 @@ def stand_row(r, steady, which, m):
 def waves_of(r, modes, m):
     """First row of the amplitudes of a row of gaps in the table of modes."""
     groups = m.sizes[MODE_GROUPS]
-    return modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS]) + 3 * groups * r
+    return modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS]) + 4 * groups * r
 
 
 @inner

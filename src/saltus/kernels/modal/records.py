@@ -108,14 +108,18 @@ def add_course_series(first, at, h, m):
     """Add the courses' part of a row of gaps to its terms in `p`; returns its size over a time h.
     Its numbers stand in the rows from `first` on, from `at` on.
     """
-    size = 0.0
+    size, behind = 0.0, at + m.sizes[TERMS] * m.sizes[COURSES] + 1
     for p in range(m.sizes[COURSES]):
         for k in range(m.sizes[TERMS]):
-            factor, power, share = number(m.steady, first, at + m.sizes[TERMS] * p + k), 1.0, 1.0
+            place, power, share = m.sizes[TERMS] * p + k, 1.0, 1.0
+            factor, terms = (
+                number(m.steady, first, at + place),
+                number(m.steady, first, behind + place),
+            )
             for j in range(m.sizes[TERMS] - k):
-                part = factor * m.record[p, VALUE + k + j] * power * share
-                m.p[j] += part
-                size += abs(part)
+                part = m.record[p, VALUE + k + j] * power * share
+                m.p[j] += factor * part
+                size += terms * abs(part)
                 power, share = power * h, share / (j + 1)
     return size
 

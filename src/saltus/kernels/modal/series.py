@@ -99,7 +99,16 @@ def answer_rate(steady, which, m):
 def numbers_of_gap(r, steady, m):
     """Place of the steady answer of a row of gaps: the first row of numbers, the first of them."""
     numbers = 1 + 2 * m.sizes[DRIVES] + m.sizes[TERMS] * m.sizes[COURSES]
-    return steady + numbers * m.sizes[STATE_GROUPS], r * numbers
+    sizes = 1 + m.sizes[TERMS] * m.sizes[COURSES]
+    return steady + numbers * m.sizes[STATE_GROUPS], r * (numbers + sizes)
+
+
+@inner
+def sizes_of_gap(at, m):
+    """Place of the sizes of the terms of a steady answer whose numbers stand from `at` on: of its
+    constant and its drives together, then of each number of its courses.
+    """
+    return at + 1 + 2 * m.sizes[DRIVES] + m.sizes[TERMS] * m.sizes[COURSES]
 
 
 # -- states and amplitudes -------------------------------------------------------------------------
@@ -170,7 +179,7 @@ def runs_of(modes, m):
     and last one of two runs. All else is zero: without contact a mode is two states.
     """
     groups = m.sizes[MODE_GROUPS]
-    return modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS] + 3 * m.sizes[GAP_ROWS])
+    return modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS] + 4 * m.sizes[GAP_ROWS])
 
 
 @inner
