@@ -12,6 +12,7 @@ import pytest
 import saltus as sl
 from oracles.structures_by_exponentials import Exponentials, random_structure
 from saltus.flow.maps import Stroboscope
+from saltus.system.linearity import linear_pieces
 
 SEED = 20261134
 #: Contacts of a structure that are compared at most.
@@ -36,12 +37,14 @@ def check(seed, method=None):
     same = list(takewhile(lambda one: one[3] < GROWN, found))
     assert len(times) >= len(same)
     speeds, grown = np.abs(run.contact_velocity.values), 1.0
+    gaps = linear_pieces(made).gaps(dict(made.values)).matrix
+    rows = {guard.name: row for guard, row in zip(made.guards, gaps, strict=True)}
     for at, (time, stop, begins, growth) in enumerate(same):
         grown = max(grown, growth, speeds.max() / speeds[at])
         assert abs(times[at] - time) < ROUNDING * grown * period, (seed, at)
         of = given.stops[stop]
-        # the gap of a single mode is that of its coordinate, and may be upside down
-        turned = np.sign(of.row[0]) if len(of.row) == 1 else 1
+        # the gap of a single mode may be that of its coordinate, upside down
+        turned = np.sign(rows[str(names[at])][: len(of.row)] @ of.row)
         assert (names[at], ways[at] * turned) == (of.name, of.side if begins else -of.side)
     if len(same) == len(found) < MOST and np.abs(whole).max() < GROWN:
         assert len(times) == len(found)
